@@ -7,6 +7,7 @@ import base64
 import contextlib
 import logging
 import math
+import re
 import secrets
 import tempfile
 import time
@@ -65,7 +66,7 @@ from companion.planner.worker import PlannerWorker
 from companion.view import AreaView
 from companion.view.area import drawn as area_drawn
 from companion.view.passage import passage_view
-from companion.words import counted, listed
+from companion.words import counted, expected, listed
 
 SIMPLER_DEG = 2e-6  # 0.2 m
 SIDES, FEW_SIDES = 48, 8  # of a circle, and of one of many
@@ -297,6 +298,17 @@ class PlanPreviews:
             return {"error": error, "legs": made, **_together(made)}
 
 
+def _in_words(problem: str) -> str:
+    """Return what was found wrong with what the page sent, with its place.
+
+    >>> _in_words("Expected `float` > 0.0 - at `$.sketch.shapes[0].radius_m`")
+    'shape 1 radius_m: expected a number above 0.0'
+    """
+    what, _, path = problem.partition(" - at `")
+    place = re.sub(r"s?\[(\d+)\]", lambda m: f" {int(m[1]) + 1}", re.sub(r"^\$\.?(sketch\.)?", "", path.rstrip("`")))
+    return f"{place.replace('.', ' ')}: {expected(what)}".removeprefix(": ")
+
+
 def _in_figures(plan: Plan, to: str, mission: Mission) -> dict[str, Any]:
     way = mission.frame().array_lonlat_from_en(plan.waypoints_en)[:, ::-1]
     return {"to": to, "why": plan.why.text, "way": np.round(way, 7).tolist(), **plan_figures(plan)}
@@ -408,7 +420,7 @@ class EditorApi:
             asked = msgspec.json.decode(body, type=_Asked)
             return HttpReply(data=msgspec.json.encode(await act(asked)))
         except (msgspec.ValidationError, msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise HttpRefusal(400, f"this is no sketch: {error}") from None
+            raise HttpRefusal(400, f"this is no sketch: {_in_words(str(error))}") from None
         except Superseded:
             raise HttpRefusal(409, "a newer request has come") from None
         except CompanionError as error:

@@ -51,10 +51,7 @@ def draft_of(base: SourceFiles, sketch: Sketch, own: AbstractSet[Path] = frozens
         known = [key for key in keys if key is not None]
         if len(set(known)) != len(known) or any(key >= count for key in known):
             raise JobError(f"{source}: the sketch names a {name} that is not in the file; load it again")
-    try:
-        options = options_of(sketch, base.options)
-    except ValueError as error:
-        raise InputError(source, "", str(error)) from None
+    options = options_of(sketch, base.options, source)
     texts, options = _area(base, sketch, options, own)
     before, text = base.options, base.toml.text
     if base.is_new:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta, Struct
 
+from companion.errors import InputError
 from companion.geofence.mission import (
     BoxOptions,
     FieldOptions,
@@ -26,6 +27,7 @@ from companion.geofence.mission import (
     StartOptions,
     is_file,
     kind_of,
+    options_in,
 )
 
 MOST_VERTICES = 20_000  # of all that is drawn by hand: a coast of more is shown, and edited where it was made
@@ -181,7 +183,6 @@ def _sketched(goal: GoalOptions, key: int) -> SketchedGoal:
 
 def _ring_of(polygon: str) -> Ring | None:
     """Return the one ring of WKT; None of a file, and of what is no single ring."""
-    from companion.errors import InputError
     from companion.geofence.formats import drawings_of
 
     if is_file(polygon):
@@ -199,11 +200,11 @@ def _ring_of(polygon: str) -> Ring | None:
     return tuple((y, x) for x, y in rings[0][:-1])
 
 
-def options_of(sketch: Sketch, before: MissionOptions) -> MissionOptions:
+def options_of(sketch: Sketch, before: MissionOptions, source: str) -> MissionOptions:
     """Return the options that a sketch stands for, whose shapes' files are left as they are.
 
     Raises:
-        ValueError: a value is missing or out of its range, in words that name its place.
+        InputError: a value is missing or out of its range; ``source`` and its place are named.
     """
     replace = msgspec.structs.replace
     heading = None if sketch.start is None else sketch.start.heading_deg
@@ -213,7 +214,7 @@ def options_of(sketch: Sketch, before: MissionOptions) -> MissionOptions:
         start=None
         if sketch.start is None
         else StartOptions(lat=sketch.start.at[0], lon=sketch.start.at[1], heading_deg=heading or 0.0),
-        goal=tuple(_goal(goal, n, before) for n, goal in enumerate(sketch.goals, start=1)),
+        goal=tuple(_goal(goal, n, before, source) for n, goal in enumerate(sketch.goals, start=1)),
         refuge=tuple(RefugeOptions(lat=r.at[0], lon=r.at[1], radius_m=r.radius_m, name=r.name) for r in sketch.refuges),
         area=replace(
             before.area,
@@ -223,19 +224,17 @@ def options_of(sketch: Sketch, before: MissionOptions) -> MissionOptions:
         ),
         skipper=replace(before.skipper, end=sketch.end, laps=sketch.laps),
     )
-    try:
-        return msgspec.convert(msgspec.to_builtins(made), MissionOptions)
-    except msgspec.ValidationError as error:
-        raise ValueError(str(error)) from None
+    return options_in(msgspec.to_builtins(made), source)
 
 
-def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOptions:
+def _goal(goal: SketchedGoal, number: int, before: MissionOptions, source: str) -> GoalOptions:
     """Return what a goal of a sketch stands for; what it leaves out is as it was, or has its default."""
+    where = f"[[goal]] {number}"
     old = before.goal[goal.key] if goal.key is not None and goal.key < len(before.goal) else None
     old = old if old is not None and kind_of(old) == goal.kind else None
     if goal.kind == "point":
         if goal.at is None:
-            raise ValueError(f"[[goal]] {number} has no place")
+            raise InputError(source, where, "has no place", "put it on the chart")
         made = PointOptions(
             lat=goal.at[0],
             lon=goal.at[1],
@@ -247,7 +246,7 @@ def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOption
         return _with(made, radius_m=goal.radius_m)
     if goal.kind == "gate":
         if goal.port_mark is None or goal.starboard_mark is None:
-            raise ValueError(f"[[goal]] {number} is a gate without two marks")
+            raise InputError(source, where, "is a gate without two marks", "put both on the chart")
         marks = [MarkOptions(lat=lat, lon=lon) for lat, lon in (goal.port_mark, goal.starboard_mark)]
         gate = GateOptions(
             port_mark=marks[0],
@@ -259,34 +258,26 @@ def _goal(goal: SketchedGoal, number: int, before: MissionOptions) -> GoalOption
         return _with(gate, mark_radius_m=goal.mark_radius_m)
     if goal.kind == "field":
         if goal.at is None or goal.field is None:
-            raise ValueError(f"[[goal]] {number} is a field without its place or its expression")
-        given = {"radius_m": goal.radius_m, "until": goal.until}
-        return msgspec.convert(
-            {
-                "kind": "field",
-                "lat": goal.at[0],
-                "lon": goal.at[1],
-                "field": goal.field,
-                "name": goal.name,
-                "for_s": goal.for_s,
-                "polygon": goal.polygon,
-                **{k: v for k, v in given.items() if v is not None},
-            },
-            FieldOptions,
+            raise InputError(
+                source, where, "is a field without its place or its expression", "write both into the file"
+            )
+        field = FieldOptions(
+            lat=goal.at[0], lon=goal.at[1], field=goal.field, name=goal.name, for_s=goal.for_s, polygon=goal.polygon
         )
+        return _with(field, radius_m=goal.radius_m, until=goal.until)
     polygon = goal.polygon if goal.ring is None else _wkt_of(goal.ring)
     if isinstance(old, BoxOptions | SearchOptions) and goal.ring is not None and _ring_of(old.polygon) == goal.ring:
         polygon = old.polygon
     if polygon is None:
-        raise ValueError(f"[[goal]] {number} has no polygon")
+        raise InputError(source, where, "has no polygon", "draw it")
     if goal.kind == "box":
         return BoxOptions(polygon=polygon, for_s=goal.for_s, name=goal.name)
     if goal.swath_m is None:
-        raise ValueError(f"[[goal]] {number} is a search without a swath")
+        raise InputError(source, where, "is a search without a swath", "say swath_m")
     return _with(SearchOptions(polygon=polygon, swath_m=goal.swath_m, name=goal.name), coverage=goal.coverage)
 
 
-def _with(goal: GoalOptions, **values: float | None) -> GoalOptions:
+def _with(goal: GoalOptions, **values: float | str | None) -> GoalOptions:
     given = {key: value for key, value in values.items() if value is not None}
     return msgspec.structs.replace(goal, **given) if given else goal
 

@@ -426,3 +426,26 @@ def test_a_full_disk_loses_nothing(bay):
     assert status == 422
     assert "No space left on device" in answer["error"]
     assert {p: p.read_bytes() for p in bay.parent.iterdir()} == before
+
+
+def test_what_is_out_of_its_range_is_told_by_its_place_and_what_it_may_be(bay):
+    """The parser's own sentence was shown: "Expected `float` > 0.0 - at `$.goal[0].radius_m`"."""
+
+    async def talk(asker):
+        sketch = (await begun(asker))["sketch"]
+        goal, shape = sketch["goals"][0], sketch["shapes"][0]
+        odd = [
+            {**sketch, "goals": [{**goal, "radius_m": -5.0}]},
+            {**sketch, "laps": 0},
+            {**sketch, "goals": [{"kind": "field", "at": [50.8, -1.3], "field": "ring", "radius_m": 0.0}]},
+            {**sketch, "shapes": [shape, {**shape, "margin_m": -1.0}]},
+        ]
+        return [(await asker.post("/api/check", {"sketch": one}))[1]["error"] for one in odd]
+
+    said = with_editor(bay, talk)
+    assert [words.removeprefix(f"{bay}: ") for words in said] == [
+        "[[goal]] 1 radius_m: -5.0 is wrong: expected a number above 0.0",
+        "[skipper] laps: 0 is wrong: expected a whole number of at least 1",
+        "[[goal]] 1 radius_m: 0.0 is wrong: expected a number above 0.0",
+        "this is no sketch: shape 2 margin_m: expected a number of at least 0.0",
+    ]

@@ -63,6 +63,7 @@ from companion.geofence.mission.options import (
 from companion.geofence.mission.text import (
     TABLE_ORDER,
     dump_options,
+    options_in,
     parse_options,
     read_options,
     toml,
@@ -121,6 +122,7 @@ __all__ = [
     "load_settings",
     "mission_files",
     "offer",
+    "options_in",
     "parse_boat_file",
     "parse_options",
     "place_troubles",

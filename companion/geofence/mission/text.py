@@ -70,6 +70,11 @@ def parse_options(text: str, source: str) -> MissionOptions:
         if isinstance(goal, dict):
             goal.setdefault("kind", "point")
     _refuse_odd_atoms(raw.get("field"), source)
+    return options_in(raw, source)
+
+
+def options_in(raw: dict[str, Any], source: str) -> MissionOptions:
+    """Return the options that tables say. Raises InputError with the table, the key and what it may be."""
     try:
         return msgspec.convert(raw, MissionOptions)
     except msgspec.ValidationError as error:
