@@ -323,7 +323,7 @@ MOST_BYTES = 65_536
 def read_secret(path: Path, what: str, remedy: str) -> str:
     """Return the text of such a file, without the blanks around it.
 
-    ``what`` is its name in a message, ``remedy`` what to do when it is not there.
+    ``what`` is its name in a message, empty where who tells of it names it; ``remedy`` what to do when it is not there.
 
     Raises:
         InputError: it cannot be read, is not text, or others may read it.
@@ -334,7 +334,7 @@ def read_secret(path: Path, what: str, remedy: str) -> str:
     except OSError as error:
         raise unreadable(str(path), error, what, remedy) from error
     except UnicodeDecodeError as error:
-        raise InputError(str(path), "", f"{what} is not text", remedy) from error
+        raise InputError(str(path), "", f"{what} is not text".lstrip(), remedy) from error
     if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise InputError(str(path), "", f"{what} can be read by others", f"chmod 600 {path}")
+        raise InputError(str(path), "", f"{what} can be read by others".lstrip(), f"chmod 600 {path}")
     return text

@@ -44,7 +44,7 @@ def checked_displays(displays: Displays, guard: Guard) -> Displays:
 
 def read_token(path: Path) -> str:
     """Return the token of a file that only its owner may read. Raises InputError."""
-    text = read_secret(path, "the Signal K token", "write it there, with mode 0600")
+    text = read_secret(path, "", "write it there, with mode 0600")
     if not text or not text.isascii() or len(text) > MOST_TOKEN or any(c.isspace() for c in text):
         raise InputError(str(path), "", "holds no token", "write the token that the server gave, and nothing else")
     return text

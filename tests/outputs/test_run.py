@@ -120,9 +120,9 @@ def empty(path):
 @pytest.mark.parametrize(
     ("make", "says", "where"),
     [
-        (lambda path: None, "the Signal K token: no such file", "mission"),
+        (lambda path: None, "no such file", "mission"),
         (empty, "holds no token", "option"),
-        (os.mkfifo, "the Signal K token: cannot be read (it is a FIFO and no regular file)", "option"),
+        (os.mkfifo, "cannot be read (it is a FIFO and no regular file)", "option"),
     ],
 )
 def test_without_a_token_that_can_be_used_a_server_is_told_without_one(tmp_path, capfd, make, says, where):
@@ -133,7 +133,7 @@ def test_without_a_token_that_can_be_used_a_server_is_told_without_one(tmp_path,
     words = ("--signalk", server, "--signalk-token", str(tmp_path / "t")) if where == "option" else ()
     assert run(path, *words) == 1  # for want of an autopilot
     out, err = capfd.readouterr()
-    assert f"{tmp_path / 't'}: {says}" in err
+    assert f"sailed without the Signal K token: {tmp_path / 't'}: {says}" in err  # its name was said twice
     assert f"note: Signal K {server}: nobody listens there; trying again" in out
     records = (tmp_path / "v/decisions.jsonl").read_text()
     assert '"what":"Signal K token","gone":true' in records
