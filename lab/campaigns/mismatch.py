@@ -23,10 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from companion.current import over_water
+from companion.fold import Step
 from companion.geo.angles import heading_of, wrap_pi
 from companion.geo.frame import LocalFrame
-from companion.messages import Mode
-from companion.telemetry.folder import DECISIONS
+from companion.messages import CompanionStatus, Mode
+from companion.telemetry.folder import DECISIONS, SailingTime
 from lab.campaigns.drawn_mismatch import SampledMismatch, draw
 from lab.methods import drawn_method
 from sitl.autopilot import MemoryLink, SimulatedAutopilot
@@ -270,7 +271,7 @@ def as_text(table: dict[str, Any]) -> str:
     if table["time_share"]:
         lines.append(
             f"time, share of what the first plan promised: {' / '.join(f'{q:.2f}' for q in table['time_share'])} "
-            f"(10, 50, 90 % of {table['timed']}); later than promised {table['later_than_promised']}"
+            f"(10, 50, 90 % of the {table['timed']} with one goal); later than promised: {table['later_than_promised']}"
         )
     if table["legs"]:
         lines.append(
@@ -332,7 +333,11 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
     case = job.case
     mission = mission_of(drawn.scenario, drawn.source)
     method = drawn_method(random.Random(f"method {job.seed}"), case.draws, mission)
-    legs = Legs(mission.frame())
+    legs, sailing = Legs(mission.frame()), SailingTime()
+
+    def listen(_: CompanionStatus, step: Step) -> None:
+        sailing.take(step)
+
     record: dict[str, Any] = {
         "seed": job.seed,
         "scenario": drawn.scenario.name,
@@ -353,6 +358,7 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
                     folder,
                     expansions=EXPANSIONS,
                     observer=legs,
+                    on_status=listen,
                     variation=method.variation(mission, PLANNED if case.planned else None),
                 )
             )
@@ -370,7 +376,6 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
     names = (
         "arrived",
         "contacts",
-        "time_s",
         "tacks",
         "min_clearance_m",
         "silence_s",
@@ -384,6 +389,8 @@ def sail_drawn(drawn: SampledMismatch, job: Job[MismatchCase]) -> dict[str, Any]
         "faults": faults,
         "below_floor": is_low,
         **{name: figures[name] for name in names},
+        # until she is there, as plans promise it: the judge's time ends with the run, seconds later
+        "time_s": sailing.time_s or 0.0,
         "path_risk": summary.get("path_risk"),
         "alerts": summary.get("alerts", {}),
         "promised_s": time_s,

@@ -91,6 +91,8 @@ def test_a_voyage_is_judged_kept_and_repeats(tmp_path, capsys):
     assert records[0] == records[1]
     assert records[0]["scenario"] == "rocks"
     assert records[0]["legs"]
+    # held against a promise of when she is there: the judge's own time had the watched loiter in it, and all were late
+    assert records[0]["time_s"] == json.loads((tmp_path / "0" / "summary.json").read_bytes())["time_s"]
     assert (tmp_path / "0" / "verdict.json").is_file()
     assert cli.main(["mismatch", "--first-seed", "3", "--keep", str(tmp_path / "0")]) == 2
     assert "is not empty" in capsys.readouterr().err
