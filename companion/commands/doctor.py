@@ -140,6 +140,7 @@ def run(args: argparse.Namespace) -> int:
             name=str(args.signing_key),
         )
         print(run_loop(seen), file=sys.stderr if args.json else sys.stdout)
+    sys.stderr.write(f"looking at the autopilot on {args.link}: about a quarter of a minute, by radio longer\n")
     findings, changes = run_loop(
         diagnose(
             open_link(args.link),

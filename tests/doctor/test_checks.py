@@ -21,6 +21,7 @@ from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serv
 from sitl.autopilot.memory_link import frames
 from sitl.world.environment import parse_wind
 from tests.doctor.test_steering import RIGHT_FF, steered
+from tests.page.asking import free_port
 from tests.sitl.boats import boat_process
 
 # ArduRover's sailboat as `sim_vehicle.py -f sailboat` starts it.
@@ -446,3 +447,11 @@ def test_how_fast_this_computer_plans_is_said(speed, level, words):
     ]
     assert [f.level for f in found] == [level]
     assert words in found[0].what
+
+
+def test_the_doctor_says_at_once_what_it_does(capsys):
+    """It was silent for a quarter of a minute, and for half of one where nobody is."""
+    link = f"udpin:127.0.0.1:{free_port()}"
+    assert main(["doctor", "--link", link, "--wait", "0.2"]) == 1
+    first = capsys.readouterr().err.splitlines()[0]
+    assert first == f"looking at the autopilot on {link}: about a quarter of a minute, by radio longer"
