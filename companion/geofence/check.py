@@ -27,6 +27,7 @@ MAX_GAPS = 20  # reported; a coast of skerries has thousands
 MAX_OBSTACLES = 2000  # above this gaps are not looked for
 # What people call the edge of the water they sail on, at the end of a name: "shore", "north-lake".
 _SHORE = re.compile(r"(.*[\W_])?(shore|shoreline|coast|lake|pond|bay|limits?|boundary|fence|water)", re.IGNORECASE)
+EDGE_M = 0.1  # what was cut along the fence, and written in degrees of seven digits, lies so far outside of it
 SEA_ROUND_M = 500.0  # open water round everything, without a fence
 
 
@@ -181,8 +182,10 @@ def _round_the_water(local: LocalArea, conditions: AreaConditions, findings: Fin
 def _sticking_out(local: LocalArea, findings: Findings) -> None:
     if local.limits is None:
         return
+    limits = shapely.buffer(local.limits, EDGE_M)
+    shapely.prepare(limits)
     for name, polygon in zip(local.names, local.polygons, strict=True):
-        if shapely.covers(local.limits, polygon):
+        if shapely.covers(limits, polygon):
             continue
         outside = shapely.disjoint(local.limits, polygon)
         findings.add(
