@@ -19,6 +19,7 @@ from companion.words import counted
 
 # Beyond this it is told why nothing happens [s]: cached, planning and drawing each take less.
 PATIENCE_S = 3.0
+FIRST_TIME = "the first time on a machine kernels are compiled and fonts are listed, which takes long"
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Finding
@@ -98,13 +99,9 @@ def refuse_existing(names: Sequence[str], *, force: bool) -> None:
 
 
 @contextlib.contextmanager
-def patience(doing: str) -> Iterator[None]:
-    """Say on stderr why nothing happens when the work within takes long: the first time on a machine it does."""
-    waiting = threading.Timer(
-        PATIENCE_S,
-        sys.stderr.write,
-        (f"note: {doing}; the first time on a machine kernels are compiled and fonts are listed, which takes long\n",),
-    )
+def patience(doing: str, why: str = FIRST_TIME) -> Iterator[None]:
+    """Say on stderr what is done and why nothing happens when the work within takes long."""
+    waiting = threading.Timer(PATIENCE_S, sys.stderr.write, (f"note: {doing}; {why}\n",))
     waiting.daemon = True
     waiting.start()
     try:

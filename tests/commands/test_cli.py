@@ -406,3 +406,18 @@ def test_the_leg_home_is_planned_and_light_wind_is_said(capsys):
     assert "light wind: her polar has no speeds for 1.0 m/s of wind, the least that it knows is 3.0 m/s" in out
     assert cli.main([*words, "5@0"]) == 0
     assert "light wind" not in capsys.readouterr().out
+
+
+def test_a_check_that_takes_long_says_why(tmp_path, monkeypatch, capsys):
+    """Of an imported chart it said nothing for eleven seconds."""
+    from companion.commands import output
+    from companion.mission_check import check_mission
+
+    def slow(*args, **words):
+        time.sleep(0.2)
+        return check_mission(*args, **words)
+
+    monkeypatch.setattr(output, "PATIENCE_S", 0.02)
+    monkeypatch.setattr("companion.mission_check.check_mission", slow)
+    assert cli.main(["mission", "check", "missions/lake.toml"]) == 0
+    assert "note: checking; to fit an area of many positions into the autopilot's fence" in capsys.readouterr().err

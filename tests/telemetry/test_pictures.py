@@ -253,6 +253,9 @@ def test_what_takes_long_says_why(monkeypatch, capsys):
     with output.patience("drawing"):
         time.sleep(0.2)
     assert "note: drawing; the first time" in capsys.readouterr().err
+    with output.patience("checking", "the area is large"):
+        time.sleep(0.2)
+    assert capsys.readouterr().err == "note: checking; the area is large\n"
     with output.patience("drawing"):
         pass
     time.sleep(0.05)
