@@ -151,7 +151,7 @@ def explained(departures: Sequence[Departure], by_utc_s: float | None) -> tuple[
     if others and all(_is_as_good(d, first, by) for d in others):
         ways = "these departures" if len(others) + 1 == len(departures) else "those that have a way"
         against = _against(first, by)
-        alike = f"none of {ways} is better than another: each is there in {said}"
+        alike = f"none of {ways} is surer or faster than another: each is there in {said}"
         return (alike + (f", {against}" if against else ""),)
     lines = [f"best, of the surest the least long under way: {iso(first.utc_s)}, there in {said}"]
     for d in others:

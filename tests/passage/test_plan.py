@@ -199,7 +199,7 @@ def test_departures_are_compared(shell):
     lines = out.splitlines()
     assert [line[:17] for line in lines[1:4]] == ["2026-04-20T00:00Z", "2026-04-20T18:00Z", "2026-04-21T12:00Z"]
     assert lines[4].startswith("of 1 member of the forecast: ")
-    assert lines[5].startswith("none of these departures is better than another: each is there in ")
+    assert lines[5].startswith("none of these departures is surer or faster than another: each is there in ")
 
 
 @pytest.mark.parametrize(

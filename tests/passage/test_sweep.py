@@ -121,10 +121,14 @@ def test_what_is_said_of_departures():
     assert lines[4] == "of 2 members of the forecast: what none of them shows may still come in 78 %"
     said = explained(found, None)
     assert len(said) == 1
-    assert said[0].startswith("none of those that have a way is better than another: each is there in 50 % of all, ")
+    assert said[0].startswith(
+        "none of those that have a way is surer or faster than another: each is there in 50 % of all, "
+    )
     assert said[0].endswith("in 50 % 14.0 m/s of wind is more than she is to be out in")
     sure = explained(sweep(asked(5.0), [T0, T0 + 3600.0], 0.0, nodes=20), None)
-    assert sure == ("none of these departures is better than another: each is there in 10.0 h as often as not",)
+    assert sure == (
+        "none of these departures is surer or faster than another: each is there in 10.0 h as often as not",
+    )
     grows = lambda t, y, x: (0.0 * x, 0.0 * y - np.where(t < 6.0 * 3600.0, 5.0, 10.0))  # noqa: E731
     ready = passage(A, B, polar=POLAR, wind=cube(LAT, LON, HOURS, grows))
     told = explained(sweep(ready, [T0 + 3600.0 * h for h in (0, 20, 24)], 0.0, nodes=20), None)
