@@ -21,7 +21,14 @@ from companion.mission_check.legs import (
     waits_s,
 )
 from companion.mission_check.sailable import require_sailable
-from companion.mission_check.words import current_words_of, passage_words, tide_words_of, wait_words, wind_limit_words
+from companion.mission_check.words import (
+    current_words_of,
+    is_of_unknown_length,
+    passage_words,
+    tide_words_of,
+    wait_words,
+    wind_limit_words,
+)
 
 __all__ = [
     "AssumedWind",
@@ -36,6 +43,7 @@ __all__ = [
     "field_preview",
     "field_track",
     "heading_fan",
+    "is_of_unknown_length",
     "layline_rad",
     "leg_names",
     "leg_problem",

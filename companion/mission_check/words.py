@@ -134,6 +134,12 @@ def wind_limit_words(mission: Mission) -> str:
     )
 
 
+def is_of_unknown_length(goal: MissionGoal) -> bool:
+    """Return whether nobody knows how long the task of a goal takes: a search, or a stay until told."""
+    task = goal.box or goal.field
+    return goal.search is not None or (task is not None and task.for_s is None)
+
+
 def wait_words(goal: MissionGoal, wait_s: float) -> str:
     """Return in words what the plan of the leg to a goal does not sail, for who reads its time; empty: nothing."""
     gate = goal.gate

@@ -31,12 +31,12 @@ from companion.geofence.autopilot_fence import FenceStatus, fence_for_autopilot
 from companion.geofence.mission import free_water
 from companion.geofence.shapes import center_of, polygon_en
 from companion.messages import GeoPoint
-from companion.mission_check import wait_words, waits_s
+from companion.mission_check import is_of_unknown_length, wait_words, waits_s
 from companion.planner.courses import courses
 from companion.plots.chart import place_words, save, scale_bar
 from companion.plots.drying import DryingPicture, draw_drying
 from companion.skipper.way import Sweep, length_m, sweeps_over
-from companion.words import counted
+from companion.words import counted, listed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -440,11 +440,13 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
             out.append(f"{name}: no path ({answer.status.value}): {answer.reason}")
     if len(out) > 1 and all(p.has_path for p in plans):
         sailing_s, waiting_s = sum(p.cost_s for p in plans), sum(waits)
+        open_ended = [name for name, goal in zip(names, mission.goals, strict=False) if is_of_unknown_length(goal)]
         out.insert(
             0,
             f"{sailing_s + waiting_s:.0f} s to all {min(len(plans), len(mission.goals))} goals"
             + (" and home" if len(plans) > len(mission.goals) else "")
-            + (f": {sailing_s:.0f} s of sailing, {waiting_s:.0f} s of waiting" if waiting_s else ""),
+            + (f": {sailing_s:.0f} s of sailing, {waiting_s:.0f} s of waiting" if waiting_s else "")
+            + (f", {listed(open_ended)} itself not counted" if open_ended else ""),
         )
     if plans and any(g.rounding or g.gate for g in mission.goals):
         out.append("the preview sails to the marks; on which side they are left is the skipper's part")

@@ -48,7 +48,7 @@ def test_a_preview_tells_what_is_waited_and_stayed(tmp_path):
     mission = load_mission(tmp_path / "m.toml")
     plans = [SimpleNamespace(cost_s=39.0, has_path=True, legs=()) for _ in goals]
     lines = "\n".join(_words(mission, plans))
-    assert lines.startswith("256 s to all 5 goals: 195 s of sailing, 61 s of waiting\n")
+    assert lines.startswith("256 s to all 5 goals: 195 s of sailing, 61 s of waiting, Open itself not counted\n")
     assert "Gun: 39 s in 0 courses, then waits 21 s for the gun\n" in lines
     assert "Hour: 39 s in 0 courses, the gun is at 2026-11-21 13:00:00 UTC\n" in lines
     assert "Box: 39 s in 0 courses, then stays 40 s\n" in lines
