@@ -49,13 +49,15 @@ class Cells(NamedTuple):
 
 
 class States(NamedTuple):
-    """How each state, a cell and a course, was first reached.
+    """How each state, a cell and a course, was first reached: in the row ``row`` of the others, -1 where it was not.
 
-    The arrival ``time`` [s], the exact place ``x``, ``y`` [m], the ``course`` (TWA) [rad] and the state ``before`` it
+    The arrival ``time`` [s], the exact place ``x``, ``y`` [m], the ``course`` (TWA) [rad] and the row ``before`` it
     (-1: the start); where the boat needs room to gybe round, what it has turned since its last leg with room for that,
-    ``wound`` [rad, signed], and its present leg so far, ``run`` [m].
+    ``wound`` [rad, signed], and its present leg so far, ``run`` [m]. Rows are in the order in which states are reached:
+    there is memory for all, and only what is written takes any.
     """
 
+    row: Ints
     time: Floats
     x: Floats
     y: Floats
@@ -140,15 +142,22 @@ def _fixed_leg(b: BoatModel, a: float, v: float, t: float, h: float, step: float
 
 @kernel
 def _states(n: int) -> States:
-    """Return ``n`` states that were not reached; of the rest only what is written is read, and its memory touched."""
+    """Return ``n`` states that were not reached."""
     return States(
-        np.full(n, np.inf), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n, np.int32)
+        np.full(n, np.int32(-1)),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n),
+        np.empty(n, np.int32),
     )
 
 
 @kernel
 def _way_back(reached: States, s: int, end: End) -> Floats:
-    """Return the points (n, 2) from the start by way of state ``s`` to the end."""
+    """Return the points (n, 2) from the start by way of the state in row ``s`` to the end."""
     path = np.empty((4096, 2))
     path[0, 0], path[0, 1] = end.x, end.y
     count = 1
@@ -178,7 +187,7 @@ def drift_search(
     keys, items, size = np.empty(1 << 14), np.empty(1 << 14, np.int32), 0
     fixed = _fixed_courses(b)
     end, last = End(bound, 0.0, 0.0, 0.0, 0.0, False), -2
-    pops, s = 0, -1
+    pops, s, rows = 0, -1, 0
     x, y, t, h, wound, run = 0.0, 0.0, 0.0, h0, 0.0, 0.0
     while True:
         d = math.hypot(aim.x - x, aim.y - y)
@@ -203,11 +212,13 @@ def drift_search(
             if i < 0 or j < 0 or i >= cells.nx or j >= cells.ny:
                 continue
             q = (i * cells.ny + j) * _COURSES + k
-            if done[q] or leg.t2 >= reached.time[q]:
+            r = reached.row[q]
+            if done[q] or (r >= 0 and leg.t2 >= reached.time[r]):
                 continue
             f1 = leg.t2 + least_from(aim, x1, y1)
             if f1 >= end.t or not is_free(g, x, y, x1, y1):
                 continue
+            wound1, run1 = 0.0, 0.0
             if b.room > 0.0:
                 turned = wrap(leg.angle - h)
                 wound1, run1 = wound + turned, math.hypot(x1 - x, y1 - y)
@@ -215,13 +226,20 @@ def drift_search(
                     run1 += run
                 if abs(wound1) > b.most_turn and s >= 0:
                     continue
-                reached.wound[q], reached.run[q] = 0.0 if run1 >= b.room else wound1, run1
+                wound1 = 0.0 if run1 >= b.room else wound1
+                if r >= 0:
+                    reached.wound[r], reached.run[r] = wound1, run1
             if b.targets.shape[0] > 0 and (
                 meets_discs(b.targets, x, y, x, y, t, leg.t1) or meets_discs(b.targets, x, y, x1, y1, leg.t1, leg.t2)
             ):
                 continue
-            reached.time[q], reached.x[q], reached.y[q], reached.course[q] = leg.t2, x1, y1, wrap(leg.angle)
-            reached.before[q] = s
+            if r < 0:
+                r, rows = rows, rows + 1
+                reached.row[q] = r
+                if b.room > 0.0:
+                    reached.wound[r], reached.run[r] = wound1, run1
+            reached.time[r], reached.x[r], reached.y[r], reached.course[r] = leg.t2, x1, y1, wrap(leg.angle)
+            reached.before[r] = s
             keys, items, size = push(keys, items, size, f1, q)
         s = -1
         while size > 0 and s < 0:
@@ -233,6 +251,7 @@ def drift_search(
         if s < 0 or pops > max_pops:
             break
         done[s] = 1
+        s = reached.row[s]
         x, y, t, h = reached.x[s], reached.y[s], reached.time[s], reached.course[s]
         if b.room > 0.0:
             wound, run = reached.wound[s], reached.run[s]
