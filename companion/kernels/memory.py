@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import mmap
@@ -11,14 +12,27 @@ from pathlib import Path
 
 _HEAD = re.compile(r"([0-9a-f]+)-([0-9a-f]+) r-.p \S+ \S+ \d+ +/.*")  # private, and cannot be written
 _SMAPS = Path("/proc/self/smaps")
+_M_MMAP_THRESHOLD = -3  # of <malloc.h>
+LARGE_BYTES = 1 << 18  # what is given back to the system as soon as it is freed
 
 
 def settle() -> None:
     """Keep what a process has loaded as what it will always have, share it with its forks, and give back the rest."""
+    part_with_large()
     gc.collect()
     gc.freeze()  # what is there now is never looked at again, so its pages stay shared
     trim()
     let_go()  # of the libraries that were read to be loaded, half is never called: what is comes back by itself
+
+
+def part_with_large() -> None:
+    """Have the C library (glibc) give back what is large when it is freed, and not keep it for later.
+
+    It begins so, and no longer does when it has seen one large array freed: from then on the arrays of a search stay in
+    the heap under what was put there after them.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE_BYTES)
 
 
 def trim() -> None:

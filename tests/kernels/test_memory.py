@@ -33,3 +33,27 @@ def test_libraries_that_were_loaded_are_let_go_and_can_be_called():
     done = subprocess.run([sys.executable, "-c", LETS_GO], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 8_000  # kB, of 30,000
+
+
+# A large array is freed, which makes glibc keep the next ones of its size; the last one lies under what stays.
+PARTS_WITH = """
+import numpy as np
+from companion.kernels.memory import settle
+
+def own_kb():
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("RssAnon"))
+
+settle()
+large = np.ones(2_000_000)
+del large
+before = own_kb()
+array = np.ones(500_000)
+stays = [bytearray(2_000) for _ in range(100)]
+del array
+print(own_kb() - before)
+"""
+
+
+def test_a_large_array_is_given_back_when_it_is_freed_whatever_was_made_after_it():
+    done = subprocess.run([sys.executable, "-c", PARTS_WITH], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 1_500  # kB, where the array is 4,000
