@@ -19,6 +19,7 @@ from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from companion.errors import InputError
+from companion.geo.distinct import distinct
 from companion.geofence.mission import MOST_PASSAGE_BYTES
 from companion.view.values import PointEn
 from companion.words import expected
@@ -296,7 +297,7 @@ def _band(planned: PlannedPassage, line: NDArray[np.float64]) -> tuple[tuple[tup
     """Return the band about the legs as polygons: along the route's line between two waypoints, as wide as is said."""
     parts = []
     for a, b in pairwise(planned.waypoints):
-        ways = np.unique([a.way_m, *line[(line[:, 0] > a.way_m) & (line[:, 0] < b.way_m), 0], b.way_m])
+        ways = distinct([a.way_m, *line[(line[:, 0] > a.way_m) & (line[:, 0] < b.way_m), 0], b.way_m])
         points = np.stack([np.interp(ways, line[:, 0], line[:, k]) for k in (1, 2)], axis=-1)
         if len(points) > 1 and b.band_m > 0.0:
             parts.append(shapely.buffer(shapely.linestrings(points), b.band_m, quad_segs=4))

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from companion.geo.distinct import distinct
 from companion.passage import Departure, Passage, Route, Sailed, shown
 from companion.passage.frame import GEOD
 from companion.passage.mission import arrivals_s, mission_of
@@ -122,7 +123,7 @@ def _finite(seconds: float) -> float | None:
 
 def _line(route: Route, sailed: Sailed) -> tuple[tuple[float, float, float], ...]:
     way, lat, lon = sailed.line.T
-    chosen = np.unique([*np.linspace(0.0, float(way[-1]), _POINTS), *_ways_of_waypoints(route, sailed)])
+    chosen = distinct([*np.linspace(0.0, float(way[-1]), _POINTS), *_ways_of_waypoints(route, sailed)])
     places = (np.interp(chosen, way, lat), np.interp(chosen, way, lon))
     return tuple((round(float(s), 0), *_place(y, x)) for s, y, x in zip(chosen, *places, strict=True))
 
@@ -142,14 +143,14 @@ def _plain(runs: Sequence[Sailed]) -> list[Sailed]:
     """Return one run of each member, by her own polar."""
     share = min({run.share for run in runs}, key=lambda share: abs(share - 1.0))
     plain = [run for run in runs if run.share == share]
-    return [plain[k] for k in np.unique(np.linspace(0, len(plain) - 1, min(len(plain), _MEMBERS)).astype(int))]
+    return [plain[int(k)] for k in distinct(np.floor(np.linspace(0, len(plain) - 1, min(len(plain), _MEMBERS))))]
 
 
 def _met(passage: Passage, route: Route, sailed: Sailed) -> tuple[PlannedWeather, ...]:
     """Return wind and current at the waypoints and between them, when the middle run is there."""
     gone = np.maximum.accumulate(sailed.rows[:, 1])
     ways = [way for way in _ways_of_waypoints(route, sailed) if way <= gone[-1]]
-    ways = np.unique(np.round([*ways, *np.linspace(0.0, gone[-1], _MET)], 0)).tolist()
+    ways = distinct(np.round([*ways, *np.linspace(0.0, gone[-1], _MET)], 0)).tolist()
     at_s = np.interp(ways, gone, sailed.rows[:, 0])
     lat, lon = (np.interp(ways, sailed.line[:, 0], sailed.line[:, k]) for k in (1, 2))
     wind = passage.weather.wind_en_mps(at_s, lat, lon)
