@@ -275,6 +275,9 @@ def _run(args: argparse.Namespace) -> int:
         fork_server = ForkServer.begin(answer_requests)
         if fork_server is not None:
             stack.callback(fork_server.close)
+        from companion.mavlink.wire import give_back_words
+
+        give_back_words()  # now: what is loaded next takes the room
         return _checked(args, fork_server)
 
 

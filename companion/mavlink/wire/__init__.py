@@ -9,6 +9,7 @@ from companion.mavlink.wire.items import first_difference, mission_hash
 from companion.mavlink.wire.parameter_ranges import BY_L1, L1_RANGES, RANGES, Effect, believable, effect_of
 from companion.mavlink.wire.sounder import Sounder
 from companion.mavlink.wire.streams import Stream
+from companion.mavlink.wire.words import give_back_words
 
 __all__ = [
     "AUTOPILOT_COMPONENT",
@@ -32,6 +33,7 @@ __all__ = [
     "believable",
     "effect_of",
     "first_difference",
+    "give_back_words",
     "is_autopilot_heartbeat",
     "mission_hash",
     "since_boot_s",
