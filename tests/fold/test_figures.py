@@ -20,7 +20,7 @@ from companion.messages import CompanionStatus
 from companion.skipper import Skipper
 from companion.skipper.step.config import SkipperConfig
 from companion.telemetry.console import progress_text
-from companion.telemetry.folder import Summary, VoyageFigures
+from companion.telemetry.folder import SailingTime, Summary, VoyageFigures
 from companion.terminal.dashboard import body_of
 from companion.view import HeardFold
 from tests.skipper.world import FRAME, World, voyage, with_parts
@@ -139,7 +139,7 @@ def test_a_row_is_in_the_report_from_its_least_to_its_most(step, monkeypatch):
     course = Figure(name="co_course", label="course", kind="bearing", of=lambda step: 1.0)
     monkeypatch.setattr(figures, "FIGURES", (way, course))
     monkeypatch.setattr(figures, "BY_NAME", {"co_test": way, "co_course": course})
-    recorded = VoyageFigures(first_s=0.0)
+    recorded = VoyageFigures(sailing=SailingTime(first_s=0.0))
     for _ in range(3):
         recorded.take(step, None)
     assert recorded.to_dict()["figures"] == {"co_test": {"least": -1.0, "most": 4.0, "mean": 2.0}}
