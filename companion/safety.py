@@ -235,7 +235,7 @@ TABLE: tuple[Watchdog, ...] = (
                   until="until a ground station is heard", settings=(
                       Setting(key="shore_lost_s", default=600.0, least=10.0, says="no station for this long"),))),
     W(name="dragged off", number=23,
-      watches="distance from the place of the loiter when the voyage is over, or on a station", enter=40.0,
+      watches="distance from the place of the loiter when the voyage is over", enter=40.0,
       exit=25.0, unit="m", enter_s=10.0, exit_s=10.0, severity=S.ERROR, response=Response.BACK, loitering=True,
       why="a loiter keeps within 13 m of it; farther off the wind is gone, a current is stronger, or she is towed"),
     W(name="planner dead", number=24,

@@ -126,6 +126,8 @@ def test_it_is_said_once_that_she_rests_elsewhere_now_with_room_or_without(place
     ctx.set(voyage=replace(ctx.state.voyage, over="the goal is reached", arrived=True, rest_en_m=QUAY.en_m))
     route, index = led_to(ctx, place), len(ctx.state.mission.route.items) - 1
     ctx.set(mission=replace(ctx.state.mission, route=replace(route, bound_for=ROOM), index=index, own_index=index))
+    vehicle = replace(ctx.snapshot.vehicle, position=FRAME.geo_from_en(*place))
+    ctx.snapshot = replace(ctx.snapshot, vehicle=vehicle, position_en_m=place)  # she lies there
     for _ in range(3):
         bound = diversion(ctx)
         assert bound is None or comes_to_rest(ctx, bound)
@@ -384,10 +386,10 @@ def test_dragged_off_behind_the_island_the_way_back_is_planned():
     world.run(30)
     world.position, world.track = (0.0, 20.0), []
     world.run(60)
-    assert said(world, "dragged off")
+    asked = [a for _, a in world.actions if isinstance(a, act.RequestPlan) and a.reason is act.ReplanReason.REST]
+    assert "she is off the place where she was to rest" in asked[0].text
     assert world.run(300, lambda w: distance_m(w.position, BEHIND.en_m) < 20.0 and w.state.phase is Phase.DONE)
     assert world.clearance() > 0.0
-    assert act.ReplanReason.REST in [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
 
 
 def test_off_her_station_behind_the_island_the_way_back_is_planned_at_once():
@@ -395,14 +397,57 @@ def test_off_her_station_behind_the_island_the_way_back_is_planned_at_once():
     world = make(BEHIND, **{**ASIDE, "obstacles": (ISLAND,), "config": {"station_s": 400.0}})
     assert world.run(900, lambda w: "keeping station" in w.state.why)
     world.run(30)
-    world.position, world.track = (0.0, 20.0), []
+    world.position, world.track, moved_s = (0.0, 20.0), [], world.t
     world.run(5)
-    asked = [a.reason for _, a in world.actions if isinstance(a, act.RequestPlan)]
-    assert asked.count(act.ReplanReason.REST) == 1
-    assert not said(world, "dragged off")
+    asked = [a.reason for t, a in world.actions if isinstance(a, act.RequestPlan) and t >= moved_s]
+    assert asked == [act.ReplanReason.NEXT_GOAL]
     assert world.run(300, lambda w: distance_m(w.position, BEHIND.en_m) < 20.0 and "keeping station" in w.state.why)
     assert world.clearance() > 0.0
     assert "waiting 400 s" not in world.state.why
+
+
+@pytest.mark.parametrize("lies", ["over", "station", "hold"])
+def test_given_back_behind_the_island_she_is_stopped_before_it_and_planned_round(lies):
+    """The leg back to the loiter that ends a mission was looked at by nothing: from 37 m off she was sailed through."""
+    world = make(BEHIND, **{**ASIDE, "obstacles": (ISLAND,), "config": {"station_s": 400.0 * (lies == "station")}})
+    assert world.run(900, lambda w: is_done(w) or "keeping station" in w.state.why)
+    if lies == "hold":
+        world.order("hold")
+    world.run(30)
+    world.set_mode(Mode.MANUAL)
+    world.run(5)
+    world.position, world.track = (0.0, 46.0), []
+    world.run(20)  # until the jump is believed
+    world.set_mode(Mode.AUTO)
+    world.run(300)  # held, she stays on this side of it
+    assert (distance_m(world.position, BEHIND.en_m) < 40.0) is (lies != "hold")
+    assert world.mode is Mode.AUTO
+    assert world.clearance() > 0.0
+
+
+def test_a_station_is_kept_at_the_last_goal_before_she_sails_home():
+    """It was kept at home: "keeping station: waiting 165 s more, 103 m off"."""
+    world = homeward(config={"station_s": 60.0})
+    assert world.run(900, lambda w: "keeping station" in w.state.why)
+    began = world.t
+    world.run(55)
+    assert distance_m(world.position, BEHIND.en_m) < 40.0
+    assert world.run(900, is_done)
+    assert "; home" in world.state.why
+    assert world.t - began > 90.0
+
+
+def test_ordered_elsewhere_from_a_station_and_told_to_go_on_she_goes_back_to_it():
+    world = make(
+        BEHIND,
+        **{**ASIDE, "obstacles": (ISLAND,), "config": {"station_s": 900.0}, "voyage": {"refuges": ((120.0, 160.0),)}},
+    )
+    assert world.run(900, lambda w: "keeping station" in w.state.why)
+    world.order("refuge")
+    assert world.run(300, lambda w: "at the refuge" in w.state.why)
+    world.order("go_on")
+    assert world.run(300, lambda w: "keeping station" in w.state.why and distance_m(w.position, BEHIND.en_m) < 20.0)
+    assert world.clearance() > 5.0
 
 
 def test_dragged_off_over_clear_water_the_autopilots_loiter_goes_back_alone():

@@ -23,9 +23,9 @@ from companion.field.values import GuidanceSettings, Intent, MovingObstacle, Set
 from companion.frozen import changed
 from companion.geo.angles import wrap_pi
 from companion.messages import Mode, Severity
-from companion.skipper.behaviors.helm import hand_back, is_busy, set_mode
+from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.diversions import diversion, is_composed, resting_en
+from companion.skipper.planning.diversions import diversion, is_composed
 from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.right_of_way import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
@@ -149,7 +149,7 @@ def intent(ctx: StepContext, seen: Situation) -> Intent:
 
     What stands still is in it.
     """
-    leg, gate, bound, rest = ctx.leg(), ctx.gate, diversion(ctx), resting_en(ctx)
+    leg, gate, bound, rest = ctx.leg(), ctx.gate, diversion(ctx), ctx.state.voyage.rest_en_m
     place = bound.en_m if bound is not None and bound.has_place else gate.en_m if gate is not None else None
     if ctx.guidance is Guidance.FIELD and place is not None:
         wanted = go_to(place, seen.twd_from_rad or 0.0)
@@ -275,7 +275,7 @@ def last_resort(ctx: StepContext) -> bool:
     resort = memory.resort.step(ctx.t_s, too_near=raised, can_plan=_is_planned(ctx), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
         bound = diversion(ctx)
-        ctx.set(by_field=FieldSteering() if resting_en(ctx) is None else FieldSteering(let_go_s=ctx.t_s))
+        ctx.set(by_field=FieldSteering(let_go_s=ctx.t_s) if _is_at_rest(ctx) else FieldSteering())
         back = "her place" if bound is None and _lies(ctx) else "the plan"
         if bound is not None and not bound.has_place:
             hold(ctx, bound.sentence, anew=True)
@@ -317,7 +317,7 @@ def last_resort(ctx: StepContext) -> bool:
 
 def _is_at_rest(ctx: StepContext) -> bool:
     """Return whether there is nothing to sail to but the place where she rests, and the straight way there is clear."""
-    return resting_en(ctx) is not None and diversion(ctx) is None
+    return bool(ctx.state.voyage.over) and diversion(ctx) is None
 
 
 def _lies(ctx: StepContext) -> bool:
@@ -353,27 +353,23 @@ def _plan(ctx: StepContext) -> None:
 
 
 # ------------------------------------------------------------------------------------------ station
-def keeps_station(ctx: StepContext) -> bool:
-    """Stay at the last goal for as long as the mission asks; True until then.
-
-    By field where that is the guidance; else the mission's safe end does it.
-    """
-    length_s, boat = ctx.config.station_s, ctx.boat_en
-    if length_s <= 0.0 or ctx.state.mission.route is None:
-        return False
-    since = ctx.state.voyage.station_since_s
-    if since is None:
-        since = ctx.t_s
-        ctx.set(voyage=changed(ctx.state.voyage, station_since_s=since))
-    left_s = length_s - (ctx.t_s - since)
-    if left_s <= 0.0:
-        return False
-    place = ctx.gates[-1].en_m
+def begin_station(ctx: StepContext, place: PointEn, until: str) -> None:
+    """Say that the boat stays at the last goal, which is for as long as the mission asks from the first time on."""
+    boat, voyage = ctx.boat_en, ctx.state.voyage
+    if voyage.station_since_s is None:
+        ctx.set(voyage=changed(voyage, station_since_s=ctx.t_s))
     off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
-    ctx.phase(Doing.HOLDING, f"keeping station: waiting {left_s:.0f} s more{off}")
+    ctx.phase(Doing.HOLDING, f"keeping station: waiting {until}{off}")
+
+
+def keeps_station(ctx: StepContext, place: PointEn, until: str) -> bool:
+    """Stay at a place by field; False where that is not the guidance: the loiter that ends the mission does it.
+
+    A motorboat lies still in that, too.
+    """
     if not ctx.is_field_steered or not ctx.config.sails:
-        hand_back(ctx)  # out of GUIDED; a motorboat lies still in the autopilot's own loiter
-        return True
+        return False
+    begin_station(ctx, place, until)
     status, seen = ctx.autopilot, situation(ctx)
     if status is not None and status.mode is not Mode.GUIDED:
         set_mode(ctx, Mode.GUIDED, "keeping station by field")

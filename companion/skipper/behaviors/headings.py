@@ -21,6 +21,7 @@ from companion.geo.angles import difference_rad, wrap_pi
 from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.planning.autopilot_beats import tacks_fail
+from companion.skipper.planning.diversions import is_shut_off
 from companion.skipper.step import Phase, StepContext
 from companion.skipper.way import Gate, PointEn, Side, bearing_rad, cross_track_m, distance_m, moved, water_at
 from companion.skipper.way.drift import DriftAhead, drift_ahead, floor_from_m
@@ -222,9 +223,12 @@ SLOW_MPS = 0.5  # slower the boat does not come far in that time
 
 
 def ahead_of(ctx: StepContext) -> DriftAhead | None:
-    """Return what the way to the present waypoint meets within ``REACT_S``, None when nothing or nobody sails it."""
+    """Return what the way to the present waypoint meets within ``REACT_S``, None when nothing or nobody sails it.
+
+    In the loiter that ends a mission it is the way back to its place.
+    """
     boat, leg, status = ctx.boat_en, ctx.leg(), ctx.autopilot
-    if boat is None or leg is None or status is None or not ctx.ahead():
+    if boat is None or leg is None or status is None or not (ctx.ahead() or is_shut_off(ctx)):
         return None
     if status.mode not in {Mode.AUTO, ctx.sails_in} or ctx.is_by_field:
         return None  # the field looks ahead by itself, and follows no leg

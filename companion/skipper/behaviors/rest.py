@@ -2,7 +2,7 @@
 
 A voyage is over when all goals are reached (and home, where the mission ends there), or its time is up. From then on
 nothing is planned but the way back to its place, should it be off it and the straight way not be clear; the watch goes
-on until somebody ends the program. So it is on a station that a mission asks for at its last goal.
+on until somebody ends the program.
 """
 
 from __future__ import annotations
@@ -13,9 +13,18 @@ from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.safety import BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
-from companion.skipper.behaviors.field_guidance import keeps_station
+from companion.skipper.behaviors.field_guidance import begin_station, keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
-from companion.skipper.planning.diversions import HOME, OFF_HOME, ROOM, home_trouble, is_at_rest, pressing
+from companion.skipper.planning.diversions import (
+    HOME,
+    OFF_HOME,
+    ROOM,
+    home_trouble,
+    is_at_rest,
+    is_shut_off,
+    pressing,
+    station_left_s,
+)
 from companion.skipper.step import Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
 from companion.skipper.way import distance_m
 from companion.words import goals_reached
@@ -33,7 +42,10 @@ UNTIL_TOLD = "until told to go on"
 
 def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     """Lie at the end of a diversion; True while the boat does."""
-    if not is_at_rest(ctx) or ctx.state.steering.own_mode in STOPPING:
+    is_station = bound.kind is DiversionKind.STATION
+    if is_station and station_left_s(ctx) > 0.0 and keeps_station(ctx, bound.en_m, bound.until):
+        return True
+    if not is_at_rest(ctx) or is_shut_off(ctx) or ctx.state.steering.own_mode in STOPPING:
         return False
     if (
         ctx.is_raised(OUT_OF_TIME)
@@ -54,6 +66,9 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     if repair(ctx):
         return True
     hand_back(ctx)
+    if is_station:
+        begin_station(ctx, bound.en_m, bound.until)
+        return True
     where = "staying near by" if bound.kind is DiversionKind.STAY else _at(ctx, bound)
     how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
     ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
@@ -98,8 +113,6 @@ def reached_words(ctx: StepContext) -> str:
 def rest(ctx: StepContext) -> None:
     """Keep station for as long as the mission asks, then lie in the mission's safe end."""
     if not ctx.state.voyage.over:
-        if keeps_station(ctx):
-            return
         if _is_on_to_its_place(ctx):
             return
         ends_home = ctx.config.safe_end is SafeEnd.RETURN and not ctx.state.voyage.home_reached

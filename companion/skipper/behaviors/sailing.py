@@ -41,7 +41,7 @@ from companion.skipper.behaviors.position_doubt import stands_off
 from companion.skipper.behaviors.rest import comes_to_rest, rest
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S, is_left_to_beat, tacks_fail
-from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed
+from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed, is_shut_off
 from companion.skipper.planning.not_found import FOUL, hold
 from companion.skipper.planning.right_of_way import stands_on
 from companion.skipper.planning.triggers import find_trigger, is_buoy
@@ -326,7 +326,7 @@ def _plan_and_resume(ctx: StepContext) -> None:
         _consider(ctx)
     if ctx.state.pending.plan is not None or ctx.state.pending.upload is not None:
         ctx.phase(Phase.HOLDING, "waiting for the plan from where the boat has drifted to, and for its upload")
-    elif ctx.state.operator.is_back and not stays and (ctx.is_way_shut or _is_outside(ctx)):
+    elif not stays and (is_shut_off(ctx) or (ctx.state.operator.is_back and (ctx.is_way_shut or _is_outside(ctx)))):
         wait_s = ctx.state.plans.retry.not_before_s - ctx.t_s
         again = f"; trying again in {wait_s:.0f} s" if wait_s > 0.0 else ""
         ctx.phase(Phase.HOLDING, f"no plan yet from where the boat has drifted to: waiting for one{again}")
@@ -359,7 +359,7 @@ def _is_outside(ctx: StepContext) -> bool:
 def _stay(ctx: StepContext, bound: Diversion, *, anew: bool = False) -> None:
     """Loiter where there is room near by; ``anew``: the loiter on board cannot be sailed to from here."""
     if ctx.state.pending.upload is None and ctx.t_s >= ctx.state.pending.upload_retry.not_before_s:
-        hold(ctx, bound.sentence, anew=anew)
+        hold(ctx, bound.sentence, anew=anew or is_shut_off(ctx))
     ctx.phase(Phase.HOLDING, f"{bound.sentence}; waiting for the loiter's upload")
 
 

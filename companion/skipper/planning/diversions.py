@@ -34,7 +34,7 @@ OFF_HOME = f"{ROOM} off {HOME}"
 AFTER_LAST_GOAL = {HOME, ROOM, OFF_HOME}  # where she may be bound for then
 HOLD_ROOM = 2.0  # times the loiter's radius: it may lie here for hours, and a HOLD carries it off before help comes
 LACK_M = 1.0  # of the room that a loiter takes: she is not moved for less, as the wind freshens
-LIES_THERE = {DiversionKind.HOME, DiversionKind.REFUGE, DiversionKind.GOAL}
+LIES_THERE = {DiversionKind.HOME, DiversionKind.REFUGE, DiversionKind.GOAL, DiversionKind.STATION}
 NO_ROOM = "{} has no room for a loiter"
 SWINGS = 1.25  # of what her loiter takes in this wind: within it she is at her place
 COMES_BACK_S = 120.0  # from where the field has led her she is back at her place: so long she is not dragged off
@@ -217,7 +217,7 @@ def _at_the_end(ctx: StepContext) -> Diversion | None:
             return ended
     if state.voyage.over:
         return _back(ctx) or _off_narrow_rest(ctx)
-    return after_last_goal(ctx) or _back(ctx) if ctx.gate is None else None
+    return _on_station(ctx) or after_last_goal(ctx) if ctx.gate is None else None
 
 
 def _ended_early(ctx: StepContext, *, over_orders: bool) -> Diversion | None:
@@ -302,7 +302,7 @@ def after_last_goal(ctx: StepContext) -> Diversion | None:
     """Return the way behind the last goal: home where the mission ends there, to water with room where the goal has
     none for a loiter; None: there is none, or she has come there.
     """  # noqa: D205
-    if ctx.state.voyage.home_reached or ctx.state.voyage.over:
+    if ctx.state.voyage.home_reached or ctx.state.voyage.over or _on_station(ctx) is not None:
         return None
     ends_home = ctx.config.safe_end is SafeEnd.RETURN
     home = _home(ctx, "all goals are reached") if ends_home else None
@@ -464,28 +464,63 @@ def _home(ctx: StepContext, why: str) -> Diversion | None:
     return Diversion(kind=DiversionKind.HOME, name=HOME, why=why, en_m=ctx.voyage.frame.en_from_geo(status.home))
 
 
-def resting_en(ctx: StepContext) -> PointEn | None:
-    """Return where the boat lies or is to lie when nothing else is to be sailed to, None: something is, or by field."""
-    voyage, route = ctx.state.voyage, ctx.state.mission.route
-    if voyage.over:
-        return voyage.rest_en_m
-    if ctx.gate is not None or not voyage.sailing or ctx.is_field_steered or route is None or not route.points_en_m:
+def station_left_s(ctx: StepContext) -> float:
+    """Return how long the boat is to stay at the last goal yet [s], 0: not at all, or no longer."""
+    since_s = ctx.state.voyage.station_since_s
+    return max(0.0, ctx.config.station_s - (0.0 if since_s is None else ctx.t_s - since_s))
+
+
+def _on_station(ctx: StepContext) -> Diversion | None:
+    """Return the last goal while the boat is to stay there, and until the mission on board ends there or leads on."""
+    left_s, last, route = station_left_s(ctx), ctx.gates[-1], ctx.state.mission.route
+    if ctx.config.station_s <= 0.0 or (left_s <= 0.0 and route is not None and route.bound_for in AFTER_LAST_GOAL):
         return None
-    return route.points_en_m[-1]
+    station = Diversion(
+        kind=DiversionKind.STATION,
+        name=f"the station {last.name}".rstrip(),
+        why="to stay there",
+        en_m=last.en_m,
+        radius_m=last.radius_m,
+        until=f"{left_s:.0f} s more",
+    )
+    is_over = left_s <= 0.0 and (is_led_to(ctx, station) or ctx.state.plans.retry.failures >= ROOM_TRIES)
+    return None if is_over else station
 
 
-def is_off_rest(ctx: StepContext) -> bool:
-    """Return whether the boat is farther from where it lies than a loiter takes it in this wind."""
-    rest, boat = resting_en(ctx), ctx.boat_en
-    return rest is not None and boat is not None and distance_m(boat, rest) > SWINGS * ctx.loiter_swing_m
+def is_led_to(ctx: StepContext, bound: Diversion) -> bool:
+    """Return whether the mission on board ends where the boat is bound for; that of the last goal ends on its station.
+
+    One that was cut short by a loiter leads nowhere.
+    """
+    route = ctx.state.mission.route
+    if route is None or route.rung == "hold":
+        return False
+    if bound.kind is DiversionKind.STATION and not route.bound_for:
+        return len(ctx.gates) - 1 in route.gate_of
+    return route.bound_for == bound.name
+
+
+def is_shut_off(ctx: StepContext) -> bool:
+    """Return whether the straight way back to the loiter that ends the mission, which the boat is off, is not clear.
+
+    The autopilot sails it all the same: led off by a field, carried by a stream or brought by a person. From below the
+    floor it is clear where it comes no nearer.
+    """
+    route, boat, area = ctx.state.mission.route, ctx.boat_en, ctx.voyage.area
+    if route is None or boat is None or ctx.ahead() or not route.points_en_m:
+        return False
+    lies_en = route.points_en_m[-1]
+    if distance_m(boat, lies_en) <= SWINGS * ctx.loiter_swing_m:
+        return False
+    here_m = float(area.clearance_m([boat])[0])
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m, here_m - LACK_M)
+    return area.path_clearance_m([boat, lies_en]) < max(0.0, floor_m)
 
 
 def _back(ctx: StepContext) -> Diversion | None:
     """Return the way back to where the boat is to rest, when it is off it and the straight way is not clear."""
-    rest, boat = resting_en(ctx), ctx.boat_en
-    off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering) or is_led_off(ctx)
-    if not ctx.state.voyage.over:  # on a station the straight way is the autopilot's at once, and nothing looks at it
-        off = off or (is_off_rest(ctx) and not ctx.ahead())
+    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
+    off = ctx.is_raised(DRAGGED) or bool(ctx.state.operator.answering) or is_led_off(ctx) or is_shut_off(ctx)
     if rest is None or boat is None or not (off or _is_bound(ctx, REST)):
         return None
     if not _is_bound(ctx, REST) and ctx.voyage.area.path_clearance_m([boat, rest]) >= ctx.config.margin_floor_m:
@@ -522,7 +557,7 @@ def is_at_rest(ctx: StepContext) -> bool:
     bound, route = diversion(ctx), ctx.state.mission.route
     if bound is None or route is None or ctx.ahead():
         return False
-    return bound.kind is DiversionKind.STAY or route.bound_for == bound.name
+    return bound.kind is DiversionKind.STAY or is_led_to(ctx, bound)
 
 
 POLICY_WORDS = {

@@ -9,7 +9,7 @@ from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.diversions import LACK_M, diversion, held_at, room_lacking_m
+from companion.skipper.planning.diversions import LACK_M, diversion, held_at, is_led_to, room_lacking_m
 from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_way_clear, leads_there, too_risky, upload
@@ -183,10 +183,12 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
 def _is_bound_alike(ctx: StepContext) -> bool:
     """Return whether what is on board is bound for where she is to go, or another refuge is asked for before it."""
     route, bound = ctx.state.mission.route, diversion(ctx)
-    is_refuge = bound is not None and bound.kind is DiversionKind.REFUGE and not bound.is_ordered
+    if route is None or bound is None:
+        return route is not None and not route.bound_for
+    is_refuge = bound.kind is DiversionKind.REFUGE and not bound.is_ordered
     if is_refuge and ctx.state.plans.retry.failures + 1 < len(ctx.voyage.refuges):
         return True  # margin is given up for one when none has a way with all of it
-    return route is not None and route.bound_for == ("" if bound is None else bound.name)
+    return is_led_to(ctx, bound)
 
 
 def _foul(ctx: StepContext, pending: PendingPlan) -> str:

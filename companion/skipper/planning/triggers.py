@@ -11,7 +11,15 @@ from companion.geo.angles import difference_rad
 from companion.messages import Severity
 from companion.skipper.planning.asking import WIDTH_AHEAD_S
 from companion.skipper.planning.autopilot_beats import is_left_to_beat, may_restart_leg
-from companion.skipper.planning.diversions import AFTER_LAST_GOAL, after_last_goal, diversion, is_composed, room_behind
+from companion.skipper.planning.diversions import (
+    AFTER_LAST_GOAL,
+    after_last_goal,
+    diversion,
+    is_composed,
+    is_led_to,
+    is_shut_off,
+    room_behind,
+)
 from companion.skipper.planning.tides import closes_ahead
 from companion.skipper.planning.vessels import meetings
 from companion.skipper.planning.waits import waits_for_gun
@@ -109,6 +117,7 @@ REASONS = {
     DiversionKind.ROOM: ReplanReason.REST,
     DiversionKind.START: ReplanReason.NEXT_GOAL,
     DiversionKind.BOX: ReplanReason.NEXT_GOAL,
+    DiversionKind.STATION: ReplanReason.NEXT_GOAL,
     DiversionKind.FIELD: ReplanReason.RETRY,
 }
 
@@ -119,7 +128,7 @@ def _diversion(ctx: StepContext, bound: Diversion | None) -> Trigger | None:
     leads_to = route.bound_for if route is not None else ""
     is_first = ctx.state.plans.retry.failures == 0  # then the wait between two tries counts
     interval_s = 0.0 if is_first else ctx.config.min_replan_interval_s
-    if bound is not None and leads_to != bound.name:
+    if bound is not None and (is_shut_off(ctx) or not is_led_to(ctx, bound)):
         is_urgent = is_first or bound.kind is DiversionKind.ROOM
         return Trigger(reason=REASONS[bound.kind], text=bound.sentence, urgent=is_urgent, interval_s=interval_s)
     is_behind = leads_to in AFTER_LAST_GOAL and after_last_goal(ctx) is not None

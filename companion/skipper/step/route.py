@@ -102,6 +102,7 @@ class DiversionKind(enum.Enum):
     START = "start"  # before a start line, until the gun
     ROOM = "room"  # where a loiter has room
     BOX = "box"  # water to stay in
+    STATION = "station"  # the last goal, where a mission asks to stay
     FIELD = "field"  # where the boat waits while a goal's field cannot be sailed
     STAY = "stay"  # where there is room near by
 

@@ -14,14 +14,7 @@ from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.autopilot_beats import beaten_within_m
-from companion.skipper.planning.diversions import (
-    diversion,
-    home_trouble,
-    is_composed,
-    is_led_off,
-    is_off_rest,
-    resting_en,
-)
+from companion.skipper.planning.diversions import SWINGS, diversion, home_trouble, is_composed, is_led_off
 from companion.skipper.planning.fallback import to_go
 from companion.skipper.step import DiversionKind, StepContext, WindHealth
 from companion.skipper.step.state import Charge
@@ -249,14 +242,13 @@ def _time(ctx: StepContext) -> float | None:
 
 
 def _dragged(ctx: StepContext) -> float | None:
-    rest, boat, voyage = resting_en(ctx), ctx.boat_en, ctx.state.voyage
-    lies = bool(voyage.over) or voyage.station_since_s is not None
-    if rest is None or boat is None or not lies or is_led_off(ctx):
+    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
+    if rest is None or boat is None or is_led_off(ctx):
         return None
-    bound = diversion(ctx)
+    bound, off_m = diversion(ctx), distance_m(boat, rest)
     if bound is not None and bound.kind is not DiversionKind.REST:
         return None
-    return distance_m(boat, rest) if is_off_rest(ctx) else 0.0
+    return off_m if off_m > SWINGS * ctx.loiter_swing_m else 0.0
 
 
 def _planner(ctx: StepContext) -> float | None:

@@ -178,6 +178,7 @@ def test_each_kind_of_diversion_has_its_reason():
         "room": ReplanReason.REST,
         "start": ReplanReason.NEXT_GOAL,
         "box": ReplanReason.NEXT_GOAL,
+        "station": ReplanReason.NEXT_GOAL,
         "field": ReplanReason.RETRY,
     }
 
