@@ -16,6 +16,7 @@ the result contains the ring by construction.
 from __future__ import annotations
 
 import enum
+import heapq
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -51,59 +52,73 @@ def reduce_ring(ring: Ring, may_add: Callable[[Polygon], bool]) -> Ring:
     A counter-clockwise ring grows, a clockwise one shrinks (its left side is the outside). ``may_add`` judges each
     triangle that a move would add. The result is simple if ``ring`` is.
     """
-    points = [(float(x), float(y)) for x, y in ring]
-    refused: set[tuple[tuple[float, float], ...]] = set()
-    while len(points) > 3:
-        for _, key, triangle, changed in sorted(_moves(points), key=lambda m: (m[0], m[1])):
-            if key in refused:
-                continue
-            if _acceptable(triangle, changed, may_add):
-                points = changed
-                break
-            refused.add(key)
+    corners = np.empty((2 * len(ring), 2))  # each that there ever was, by its number: an edge's move makes one of two
+    corners[: len(ring)] = ring
+    count, order = len(ring), list(range(len(ring)))
+    refused: set[tuple[_Point, ...]] = set()
+    offered: list[tuple[float, tuple[_Point, ...], list[int], _Point | None]] = []
+
+    def offer(at: int) -> None:
+        around = [order[(at + k) % len(order)] for k in (-1, 0, 1, 2)]
+        a, b, c, d = ((float(x), float(y)) for x, y in corners[around])
+        move = _move(a, b, c, d)
+        if move is not None:
+            area, key, meet = move
+            heapq.heappush(offered, (area, key, around[: len(key)], meet))
+
+    for at in range(len(order)):
+        offer(at)
+    # Corners come only in the place of others, so those that are all still there are still neighbours.
+    there = set(order)
+    while len(order) > 3 and offered:
+        _, key, around, meet = heapq.heappop(offered)
+        if key in refused or not there.issuperset(around):
+            continue
+        at, changed = order.index(around[1]), list(order)
+        if meet is None:
+            del changed[at]
+            triangle = list(key)
         else:
-            break
-    return np.array(points)
+            changed[at], corners[count] = count, meet
+            del changed[(at + 1) % len(order)]
+            triangle = [key[1], meet, key[2]]
+        if not _acceptable(triangle, corners[changed], may_add):
+            refused.add(key)
+            continue
+        if meet is not None:
+            at = changed.index(count)
+            count += 1
+        order, there = changed, set(changed)
+        for near in range(at - 2, at + 2):
+            offer(near)
+    return corners[order]
 
 
-def _acceptable(
-    triangle: list[tuple[float, float]], changed: list[tuple[float, float]], may_add: Callable[[Polygon], bool]
-) -> bool:
-    polygon = Polygon(triangle)
+_Point = tuple[float, float]
+
+
+def _acceptable(triangle: list[_Point], changed: Ring, may_add: Callable[[Polygon], bool]) -> bool:
+    polygon = shapely.polygons(triangle)
     if polygon.area > 0.0 and not may_add(polygon):
         return False
-    return bool(shapely.is_simple(shapely.linearrings(changed))) and bool(shapely.is_valid(Polygon(changed)))
+    outline = shapely.linearrings(changed)
+    return bool(shapely.is_simple(outline)) and bool(shapely.is_valid(shapely.polygons(outline)))
 
 
-_Move = tuple[float, tuple[tuple[float, float], ...], list[tuple[float, float]], list[tuple[float, float]]]
+def _move(a: _Point, b: _Point, c: _Point, d: _Point) -> tuple[float, tuple[_Point, ...], _Point | None] | None:
+    """Return (area added, the corners that it rests on, what takes the place of b and c) of dropping b or b→c."""
+    turn = _cross(a, b, c)
+    if turn <= 0.0:
+        return -turn / 2.0, (a, b, c), None
+    meet = _meeting(a, b, c, d) if _cross(b, c, d) > 0.0 else None
+    return None if meet is None else (abs(_cross(b, meet, c)) / 2.0, (a, b, c, d), meet)
 
 
-def _moves(points: list[tuple[float, float]]) -> list[_Move]:
-    """Return (area added, key, triangle, new ring) of every move."""
-    n = len(points)
-    turns = [_cross(points[i - 1], points[i], points[(i + 1) % n]) for i in range(n)]
-    out: list[_Move] = []
-    for i in range(n):
-        a, b, c, d = points[i - 1], points[i], points[(i + 1) % n], points[(i + 2) % n]
-        if turns[i] <= 0.0:
-            out.append((-turns[i] / 2.0, (a, b, c), [a, b, c], points[:i] + points[i + 1 :]))
-        elif turns[(i + 1) % n] > 0.0 and n > 3:
-            meet = _meeting(a, b, c, d)
-            if meet is not None:
-                changed = list(points)
-                changed[i] = meet
-                del changed[(i + 1) % n]
-                out.append((abs(_cross(b, meet, c)) / 2.0, (a, b, c, d), [b, meet, c], changed))
-    return out
-
-
-def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+def _cross(a: _Point, b: _Point, c: _Point) -> float:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
-def _meeting(
-    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float], d: tuple[float, float]
-) -> tuple[float, float] | None:
+def _meeting(a: _Point, b: _Point, c: _Point, d: _Point) -> _Point | None:
     """Return where a→b and d→c meet beyond b and c, None if they do not."""
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - d[0], c[1] - d[1]
     determinant = ux * vy - uy * vx
@@ -489,12 +504,12 @@ def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoin
         return refuse(FenceStatus.NO_WATER, "the start is not inside the fence")
     way = _way(plane, inside)
 
-    def made(reach_m: float, steps: Sequence[float]) -> AutopilotFence:
+    def made(reach_m: float, steps: Sequence[float], most_items: float = MAX_FENCE_ITEMS) -> AutopilotFence:
         """Return the fence of what lies so near to the way, with the least of the margin that is enough for it."""
         around, held = _near(solids, way, reach_m * (1.0 + plane.error))
         status, last = FenceStatus.NO_MARGIN, ""
         for step in steps:
-            zones, last = _attempt(plane, around, held, limits, rim, usable_m * step, usable_m)
+            zones, last = _attempt(plane, around, held, limits, rim, usable_m * step, usable_m, most_items)
             if zones is None:
                 status = FenceStatus.NO_MARGIN
                 continue
@@ -530,7 +545,8 @@ def fence_for_autopilot(area: Area, margin_m: float, *, inside: Sequence[GeoPoin
         max((float(shapely.hausdorff_distance(s.polygon, way)) for s in solids), default=0.0),
         lambda reach_m: made(reach_m, STEPS[-1:]).status is FenceStatus.OK,
     )
-    return whole if reach_m is None else made(reach_m, STEPS)
+    # what was left off half way does not say how many items it would have been, and for whom
+    return made(math.inf, STEPS[-1:], math.inf) if reach_m is None else made(reach_m, STEPS)
 
 
 def _largest_reach_m(least_m: float, most_m: float, fits: Callable[[float], bool]) -> float | None:
@@ -622,8 +638,12 @@ def _attempt(
     rim: Circle | None,
     tolerance_m: float,
     usable_m: float,
+    most_items: float,
 ) -> tuple[list[Zone] | None, str]:
-    """Return zones round all that is ``held``, within ``tolerance_m`` of what is ``around``, or why there are none."""
+    """Return zones round all that is ``held``, within ``tolerance_m`` of what is ``around``, or why there are none.
+
+    It is left off as soon as it is sure that they are more than ``most_items``.
+    """
     zones: list[Zone] = []
     reserve_m = RESERVE_M + _bulge_m(held, limits, plane)
     if limits is not None:
@@ -646,12 +666,21 @@ def _attempt(
         beyond = shapely.difference(shapely.box(*limits.buffer(1e4).bounds), shapely.buffer(limits, -tolerance_m))
         allowed = shapely.union(allowed, beyond)
     shapely.prepare(allowed)
-    for group in _groups(held, allowed):
-        zone = _keep_out(plane, group, allowed, tolerance_m, reserve_m)
-        if zone is None:
-            return None, f"{group[0].name} does not fit into {tolerance_m:.2f} m of margin"
-        zones.append(zone)
-    return zones, ""
+    groups = _groups(held, allowed)
+    wholes = [_whole(group) for group in groups]
+    found = [_circle_round(plane, *pair, allowed, reserve_m) for pair in zip(groups, wholes, strict=True)]
+    # small ones first: they take no time to reduce and their items count as much
+    left = sorted((i for i, z in enumerate(found) if z is None), key=lambda i: shapely.get_num_coordinates(wholes[i]))
+    count = sum(_sides(z) for z in zones) + len(found) - len(left)
+    for done, i in enumerate(left):
+        if count + 3 * (len(left) - done) > most_items:
+            return None, f"more than {most_items:g} items are needed"
+        polygon = grown_polygon(wholes[i], reserve_m, tolerance_m, allowed)
+        if polygon is None:
+            return None, f"{groups[i][0].name} does not fit into {tolerance_m:.2f} m of margin"
+        zone = Zone(kind=ZoneKind.EXCLUSION, shape=_rounded(polygon, plane), name=_names(groups[i]))
+        found[i], count = zone, count + _sides(zone)
+    return zones + [z for z in found if z is not None], ""
 
 
 def _bulge_m(solids: list[_Solid], limits: BaseGeometry | None, plane: Plane) -> float:
@@ -665,34 +694,45 @@ def _bulge_m(solids: list[_Solid], limits: BaseGeometry | None, plane: Plane) ->
 def _groups(solids: list[_Solid], allowed: BaseGeometry) -> list[list[_Solid]]:
     """Join obstacles whose common hull is all margin: one zone is cheaper than two."""
     groups = [[s] for s in solids]
+    hulls = [shapely.convex_hull(shapely.union_all([s.polygon])) for s in solids]
+    numbers, made = list(range(len(solids))), len(solids)  # of the hulls: what is known of a pair outlasts a merger
+    apart: set[tuple[int, int]] = set()
     merged = True
     while merged and len(groups) > 1:
         merged = False
-        hulls = [shapely.convex_hull(shapely.union_all([s.polygon for s in g])) for g in groups]
         pairs = shapely.STRtree(hulls).query(hulls, predicate="dwithin", distance=50.0)
-        order = sorted(((float(shapely.distance(hulls[i], hulls[j])), int(i), int(j)) for i, j in pairs.T if i < j))
-        for _, i, j in order:
+        fresh = [(i, j) for i, j in pairs.T.tolist() if i < j and (numbers[i], numbers[j]) not in apart]
+        for _, i, j in sorted((float(shapely.distance(hulls[i], hulls[j])), i, j) for i, j in fresh):
             if shapely.covers(allowed, shapely.convex_hull(shapely.union_all([hulls[i], hulls[j]]))):
                 groups[i] += groups.pop(j)
+                hulls[i] = shapely.convex_hull(shapely.union_all([s.polygon for s in groups[i]]))
+                hulls.pop(j)
+                numbers.pop(j)
+                numbers[i] = made = made + 1
                 merged = True
                 break
+            apart.add((numbers[i], numbers[j]))
     return groups
 
 
-def _keep_out(
-    plane: Plane, group: list[_Solid], allowed: BaseGeometry, tolerance_m: float, reserve_m: float
+def _whole(group: list[_Solid]) -> Polygon:
+    """Return what a zone round the group has to hold."""
+    return group[0].polygon if len(group) == 1 else shapely.convex_hull(shapely.union_all([s.polygon for s in group]))
+
+
+def _names(group: list[_Solid]) -> str:
+    return " + ".join(s.name for s in group)
+
+
+def _circle_round(
+    plane: Plane, group: list[_Solid], whole: Polygon, allowed: BaseGeometry, reserve_m: float
 ) -> Zone | None:
-    """Return the cheapest zone round a group of obstacles: a circle, else a polygon."""
-    name = " + ".join(s.name for s in group)
-    whole = group[0].polygon if len(group) == 1 else shapely.convex_hull(shapely.union_all([s.polygon for s in group]))
+    """Return a circle round a group of obstacles: the cheapest zone, where it is allowed."""
     x, y, radius = group[0].circle if len(group) == 1 and group[0].circle else enclosing_circle(whole)
     radius_m = math.ceil((radius + reserve_m) / (1.0 - plane.error) * 20.0) / 20.0
-    if shapely.covers(allowed, circle_round(x, y, radius_m * (1.0 + plane.error))):
-        return Zone(kind=ZoneKind.EXCLUSION, shape=Circle(plane.geo(x, y), radius_m), name=name)
-    polygon = grown_polygon(whole, reserve_m, tolerance_m, allowed)
-    if polygon is None:
+    if not shapely.covers(allowed, circle_round(x, y, radius_m * (1.0 + plane.error))):
         return None
-    return Zone(kind=ZoneKind.EXCLUSION, shape=_rounded(polygon, plane), name=name)
+    return Zone(kind=ZoneKind.EXCLUSION, shape=Circle(plane.geo(x, y), radius_m), name=_names(group))
 
 
 def _keep_in(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, Polygon
 
 from companion.geo.frame import LocalFrame
-from companion.geofence import Area, Circle, Fence, Obstacle, Zone, ZoneKind, load_mission
+from companion.geofence import Area, Circle, Fence, Obstacle, Zone, ZoneKind, autopilot_fence, load_mission
 from companion.geofence.autopilot_fence import (
     AUTOPILOT_METRES_PER_DEGREE,
     STEPS,
@@ -483,6 +483,69 @@ def test_the_move_that_gives_away_least_is_tried_first(seed):
     reduce_ring(np.column_stack([r * np.cos(t), r * np.sin(t)]), lambda tri: tried.append(tri.area))  # none may be
     assert len(tried) > 1
     assert tried == pytest.approx(sorted(tried))
+
+
+@pytest.mark.parametrize("grows", [True, False])
+def test_a_move_is_reckoned_once_and_again_only_beside_one_that_was_taken(monkeypatch, grows):
+    """All moves of 600 corners after each that is taken are 150 000 turns: seconds of a core for a chart."""
+    rng = np.random.default_rng(4)
+    t = 2.0 * math.pi * np.arange(600) / 600
+    r = 800.0 * rng.uniform(0.99, 1.0, 600)
+    ring = np.column_stack([r * np.cos(t), r * np.sin(t)])[:: 1 if grows else -1]
+    turns = []
+    monkeypatch.setattr(
+        autopilot_fence, "_cross", lambda a, b, c, of=autopilot_fence._cross: turns.append(b) or of(a, b, c)
+    )
+    assert len(reduce_ring(ring, lambda triangle: triangle.area < 200.0)) < 150
+    assert len(turns) < 20 * len(ring)
+
+
+def plainly_reduced(ring, most_area):
+    """All moves anew after each: what ``reduce_ring`` is to be, without what it remembers."""
+    points, refused = [(float(x), float(y)) for x, y in ring], set()
+    while len(points) > 3:
+        n, found = len(points), []
+        for i in range(n):
+            a, b, c, d = (points[(i + k) % n] for k in (-1, 0, 1, 2))
+            move = autopilot_fence._move(a, b, c, d)
+            if move is not None and move[1] not in refused:
+                found.append((*move[:2], i, move[2]))
+        for _, key, i, meet in sorted(found, key=lambda move: move[:2]):
+            changed = list(points)
+            changed[i : i + 1] = [] if meet is None else [meet]
+            if meet is not None:
+                del changed[(i + 1) % n]
+            triangle = Polygon(key if meet is None else (key[1], meet, key[2]))
+            if triangle.area <= most_area and Polygon(changed).is_valid:
+                points = changed
+                break
+            refused.add(key)
+        else:
+            break
+    return np.array(points)
+
+
+@settings(**QUIET, max_examples=60)
+@given(st.integers(0, 10_000), st.integers(4, 40), st.sampled_from([20.0, 100.0, 500.0]), st.booleans())
+def test_what_is_remembered_of_moves_changes_nothing(seed, corners, most_area, grows):
+    rng = np.random.default_rng(seed)
+    t = 2.0 * math.pi * np.arange(corners) / corners
+    r = 60.0 * rng.uniform(0.35, 1.0, corners)
+    ring = np.column_stack([r * np.cos(t), r * np.sin(t)])[:: 1 if grows else -1]
+    reduced = reduce_ring(ring, lambda triangle: triangle.area <= most_area)
+    assert np.array_equal(reduced, plainly_reduced(ring, most_area))
+
+
+def test_of_more_than_fits_no_corner_is_reduced_that_cannot_count(monkeypatch):
+    """30 stars of three corners at the least are 90 items: that is known before any is reduced."""
+    reduced = []
+    of = autopilot_fence.reduce_ring
+    monkeypatch.setattr(autopilot_fence, "reduce_ring", lambda ring, may_add: reduced.append(1) or of(ring, may_add))
+    inside = [ORIGIN, LocalFrame(ORIGIN).geo_from_en(50.0, 650.0)]
+    result = fence_for_autopilot(Area(obstacles=stars(30)), 5.0, inside=inside)
+    assert result.status is FenceStatus.OK
+    assert result.reach_m < math.inf
+    assert len(reduced) < 100  # each of them at each share of the margin and each reach is 272
 
 
 def test_of_water_that_falls_apart_where_it_is_narrow_the_largest_part_is_thinned():
