@@ -161,10 +161,13 @@ def read_fields(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
         return _fields(source, str(source.get("id", "problem")))
     path = Path(source)
     try:
-        raw = json.loads(read_regular(path))
+        data = read_regular(path)
+        raw = json.loads(data)
     except OSError as error:
         raise InputError(str(path), "", f"cannot be read ({error.strerror})", "name a problem file") from error
     except (ValueError, RecursionError) as error:
+        if not data.strip():
+            raise InputError(str(path), "", "is empty", "name a problem file") from None
         raise InputError(str(path), "", f"is not JSON ({error})", "see docs/reference/problem-format.md") from error
     if not isinstance(raw, Mapping):
         raise InputError(str(path), "", "is not a JSON object", "see docs/reference/problem-format.md")

@@ -62,6 +62,15 @@ def test_a_file_that_is_not_json(tmp_path):
         Problem.from_json(tmp_path / "missing.json")
 
 
+@pytest.mark.parametrize("text", ["", " \n"])
+def test_a_file_with_nothing_in_it_is_called_empty(tmp_path, text):
+    path = tmp_path / "empty.json"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        Problem.from_json(path)
+    assert str(caught.value) == f"{path}: is empty; name a problem file"
+
+
 @settings(max_examples=60)
 @given(random_problems())
 def test_write_then_read_is_the_same_problem(raw):
