@@ -209,11 +209,26 @@ def told_of(chart: Chart) -> str:
     counts: dict[str, int] = {}
     for danger in chart.dangers:
         counts[danger.reason] = counts.get(danger.reason, 0) + 1
-    words = ", ".join(counted(n, reason) if reason in _COUNTED else f"{n} {reason}" for reason, n in counts.items())
-    return words or "no danger"
+    words = (counted(n, *_NOUNS[reason]) if reason in _NOUNS else f"{n} {reason}" for reason, n in counts.items())
+    return ", ".join(words) or "no danger"
 
 
-_COUNTED = frozenset({"wreck", "rock", "obstruction", "sounding", "buoy", "beacon", "mooring", "pile", "bridge"})
+# One and more of a thing. A file may give reasons of its own, which are left as they are.
+_NOUNS: dict[str, tuple[str] | tuple[str, str]] = {
+    **{word: (word,) for kinds in (SOLID, OVERHEAD, SUBMERGED, RESTRICTED) for word in kinds.values()},
+    **{word: (word,) for word in ("sounding", "buoy", "beacon", "pier", "breakwater", "groyne")},
+    **{word: (word,) for word in ("shore", "reef", "shoal")},
+    "drawn": ("drawn shape",),
+    "shallow or land": ("shallow or dry area",),
+    "land": ("piece of land", "pieces of land"),
+    "not surveyed": ("area not surveyed", "areas not surveyed"),
+    "no depth told": ("area without a depth", "areas without a depth"),
+    "shallow": ("shallow area",),
+    "dries": ("area that dries", "areas that dry"),
+    "entry prohibited": ("area of no entry", "areas of no entry"),
+    "fishing stakes": ("fishing stake",),
+    "beach": ("beach", "beaches"),
+}
 
 
 def _is_area(row: Row) -> bool:

@@ -303,7 +303,7 @@ def _write_text(d: dict[str, Any], units: str) -> None:
     safe = None if plan["promised_risk"] is None else 1.0 - plan["promised_risk"]
     print(f"{state}  {helm}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")
     print(
-        f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+.1f')} m"
+        f"  WP {show(w['seq'])}/{show(w['count'])} {show(w['distance_m'])} m  xt {show(w['cross_track_m'], '+z.1f')} m"
         f"  next tack {tack} | goal {show(goal['distance_m'])} m"
         f"  ({(goal['index'] or 0) + 1} of {show(goal['count'])})"
     )

@@ -302,7 +302,7 @@ def progress_text(step: Step) -> str:
             parts.append(f"next tack {tack.words}")
         off_m = on_leg(step).off_m
         if off_m is not None:
-            parts.append(f"xt {off_m:+.1f} m")
+            parts.append(f"xt {off_m:+z.1f} m")
     if state.progress.task:
         parts.append(state.progress.task)
     if state.orders.standing is not None:

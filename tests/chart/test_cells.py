@@ -70,7 +70,7 @@ def test_two_cells_are_one_area_by_the_command(tmp_path, monkeypatch, capsys):
     written(tmp_path, east, "b.000")
     words = ["chart", "import", "a.000", "b.000", "--around", "50.82,-1.31", "--radius", "5000", "--depth", "2"]
     assert cli.main(words) == 0
-    assert "XX5TEST edition 9 of 2026-01-02: 1 land" in capsys.readouterr().out
+    assert "XX5TEST edition 9 of 2026-01-02: 1 piece of land" in capsys.readouterr().out
     features = json.loads((tmp_path / "chart.geojson").read_text())["features"]
     shapes = [(f["properties"], shapely.from_geojson(json.dumps(f["geometry"]))) for f in features]
     solid = shapely.union_all([shape for _, shape in shapes])

@@ -11,7 +11,8 @@ import shapely
 from shapely.geometry import LineString, Point, box
 
 from companion import cli
-from companion.chart import Wanted, area_of, box_about, read_chart
+from companion.chart import Wanted, area_of, box_about, read_chart, told_of
+from companion.chart.features import Chart, Danger, Source
 from companion.errors import InputError
 from companion.geofence import Circle, Code, Document, Zone, ZoneKind, load_mission, read
 from companion.geofence.formats import write
@@ -115,7 +116,7 @@ def test_an_island_and_a_bank_of_one_grid_have_a_depth_each(shell):
     (shell.folder / "m.toml").write_text(MISSION)
     code, out, _ = shell("g.asc", "--mission", "m.toml", "--radius", "1500.4")
     assert code in {0, 1}
-    assert out.startswith("g.asc: 2 shallow or land\n")
+    assert out.startswith("g.asc: 2 shallow or dry areas\n")
     assert " within 1500 m of " in out
     solid = json.loads((shell.folder / "m-chart.geojson").read_text())["features"]
     assert sorted(f["properties"]["depth_m"] for f in solid if "depth_m" in f["properties"]) == [-5.0, 1.0]
@@ -362,7 +363,7 @@ def test_layers_called_as_s57_calls_its_classes_are_read_as_those(shell):
     layer(path, [Point(-1.305, 50.82), Point(-1.30, 50.82)], "WRECKS", VALSOU=np.array([1.0, 9.0]))
     code, out, err = shell(path, *AROUND, "--depth", "2")
     assert (code, err) == (0, "")
-    assert "1 shallow, 1 wreck" in out
+    assert "1 shallow area, 1 wreck" in out
     assert obstacles(shell.folder) == {"shallow", "wreck"}
 
 
@@ -625,3 +626,26 @@ def test_a_chart_that_lies_elsewhere_makes_no_free_water(shell):
     assert code == 0
     assert f"other.wkt: {reaches}" in out
     assert "written: 1 obstacle" in out
+
+
+def test_what_a_chart_holds_is_told_with_number_and_noun():
+    """ "39 shore construction", "9 land" and "1 fishing stakes" were said of a cell."""
+    reasons = ["shore construction", "marine farm", "land", "dries", "fishing stakes"]
+    chart = read_of([*reasons, "shallow", "sounding"], 1)
+    assert told_of(chart) == (
+        "1 shore construction, 1 marine farm, 1 piece of land, 1 area that dries, 1 fishing stake, 1 shallow area, "
+        "1 sounding"
+    )
+    assert told_of(read_of([*reasons, "beach"], 2)) == (
+        "2 shore constructions, 2 marine farms, 2 pieces of land, 2 areas that dry, 2 fishing stakes, 2 beaches"
+    )
+    assert told_of(read_of(["shallow or land", "drawn", "kept by custom"], 2)) == (
+        "2 shallow or dry areas, 2 drawn shapes, 2 kept by custom"
+    )
+    assert told_of(read_of([], 1)) == "no danger"
+
+
+def read_of(reasons, each):
+    """A chart with so many dangers of each kind."""
+    dangers = tuple(Danger(reason=reason, geometry=Point(0.0, 0.0)) for reason in reasons for _ in range(each))
+    return Chart(source=Source(name="cell"), dangers=dangers)

@@ -129,6 +129,15 @@ def test_steered_by_headings_the_way_to_the_waypoint_is_her_own():
     assert re.search(r"wp \d+/\d+ (\d+) m", progress_text(by_autopilot))[1] == "0"
 
 
+@pytest.mark.parametrize(("off_m", "told"), [(-0.04, "xt +0.0 m"), (0.0, "xt +0.0 m"), (-0.06, "xt -0.1 m")])
+def test_no_distance_off_the_leg_has_no_side(off_m, told):
+    world = World(Skipper(voyage=voyage(), config=SkipperConfig()), shown={"cross_track_m": off_m})
+    assert world.run(120, lambda w: w.mode is Mode.AUTO and w.speed > 1.0)
+    world.run(5)
+    step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
+    assert told in progress_text(step)
+
+
 def test_held_in_a_loiter_no_tack_comes_and_the_way_to_the_circles_middle_is_none_to_the_waypoint():
     """ "WP 1/3 0 m  next tack about 6 s" was told by radio of a boat that lay in LOITER 292 m before it."""
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()), shown={"waypoint_distance_m": 0.0})
