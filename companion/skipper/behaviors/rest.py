@@ -111,7 +111,7 @@ def reached_words(ctx: StepContext) -> str:
 
 
 def rest(ctx: StepContext) -> None:
-    """Keep station for as long as the mission asks, then lie in the mission's safe end."""
+    """Lie in the loiter that ends the mission: the voyage is over when nothing is left to sail to."""
     if not ctx.state.voyage.over:
         if _is_on_to_its_place(ctx):
             return
