@@ -179,13 +179,7 @@ def test_scenario(name, tmp_path):
         RECORDED[name](tmp_path)
 
 
-# Of seed 1 these do not pass, and why.
-KNOWN_OF_SEED_1 = {
-    "irons": "two tacks fail at the start, and gybing round to windward she is not there within the limit"
-}
-
-
-@pytest.mark.parametrize("name", sorted({*ALL} - {*KNOWN_OF_SEED_1}))
+@pytest.mark.parametrize("name", ALL)
 def test_scenario_of_another_seed(name, tmp_path):
     sail(name, 1, tmp_path, shorter)
 

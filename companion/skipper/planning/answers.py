@@ -17,7 +17,7 @@ from companion.planner.problem import evaluate, resolved
 from companion.planner.risk import arrival, path_risk
 from companion.planner.track import ExpectedTrack
 from companion.skipper.planning.asking import UPLOAD_LATENCY_S, request
-from companion.skipper.planning.autopilot_beats import may_restart_leg, tacks_fail
+from companion.skipper.planning.autopilot_beats import gybing_radius_m, may_restart_leg, tacks_fail
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.fallback import leaves_headings
 from companion.skipper.planning.not_found import MORE, asks_again, not_found
@@ -390,6 +390,7 @@ def _gybed_round(ctx: StepContext, pending: PendingPlan, start: PointEn, points:
         twd_from_rad=pending.facts.plan_twd_from_rad,
         area=ctx.voyage.area,
         floor_m=min(ctx.config.margin_floor_m, pending.facts.margin_m),
+        radius_m=gybing_radius_m(ctx),
     )[1:]
 
 

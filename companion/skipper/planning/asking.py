@@ -13,7 +13,7 @@ from companion.errors import InputError
 from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.planner import Problem
-from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, problem_beat
+from companion.skipper.planning.autopilot_beats import FOLLOWS_RAD, gybing_s, problem_beat, tacks_fail
 from companion.skipper.planning.diversions import after_last_goal, diversion, gate_for, room_behind
 from companion.skipper.planning.ladder import Rung
 from companion.skipper.planning.statement import Aim, Start, aim_at, aim_near, problem_dict, repaired
@@ -175,6 +175,8 @@ def _failing(ctx: StepContext) -> dict[str, Any]:
     """Return what is known of tacks that fail, as a problem's boat has it: before the first, the chance alone."""
     tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
     failing: dict[str, Any] = {"tack_fails": tacking.chance(given)}
+    if tacks_fail(ctx):
+        failing["tack_loss_s"] = max(ctx.voyage.boat.tack_loss_s, gybing_s(ctx))
     if given > 0.0 and tacking.failed:
         failing |= {
             "irons_s": max(IRONS_S, tacking.irons_s),

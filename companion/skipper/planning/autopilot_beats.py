@@ -13,6 +13,7 @@ from companion.geo.angles import difference_rad
 from companion.skipper.step import StepContext
 from companion.skipper.step.wind_shifts import shifting
 from companion.skipper.way import PointEn, bearing_rad, cross_track_m
+from companion.skipper.way.geometry import GYBE_RADIUS_M, LOOP_RADII
 
 IRONS_MEMORY_S = 600.0
 TACKS_FAIL_AFTER = TRIES  # failures in a row, or times in irons within IRONS_MEMORY_S, before tacks are left
@@ -20,6 +21,7 @@ WIDEST_M = 50.0  # a wider corridor is no corridor ...
 WIDEST_BY_SHIFTS_M = 200.0  # ... but where the boat tacks on the shifts: then its edges are seldom met
 CARRIED_S = 2.5  # of a tack, at the corridor's edge: where the water takes the boat meanwhile
 OFF_LINE_M = 2.0  # so near the line a leg that begins anew is the same leg
+LEAST_MPS = 0.5  # slower than this gybing round takes no longer
 FOLLOWS_RAD = math.radians(10.0)  # this far outside its no-go zone the autopilot keeps to the line
 
 
@@ -29,6 +31,22 @@ def tacks_fail(ctx: StepContext) -> bool:
     tacking, given = ctx.state.tacking, ctx.voyage.boat.tack_fails
     in_a_row = tacking.in_a_row if given > 0.0 and ctx.t_s - tacking.failed_s < IRONS_MEMORY_S else 0
     return max(len(recent), in_a_row) >= TACKS_FAIL_AFTER
+
+
+def gybing_radius_m(ctx: StepContext) -> float:
+    """Return the radius of the circle on which the boat gybes round [m]: her own, no less than waypoints ask for."""
+    return max(GYBE_RADIUS_M, _full_mps(ctx) / ctx.voyage.boat.turn_rate_radps)
+
+
+def gybing_s(ctx: StepContext) -> float:
+    """Return what gybing round costs over the turn through the wind that a plan counts [s, at least 0]."""
+    turn_s = 2.0 * ctx.no_go_half_rad / ctx.voyage.boat.turn_rate_radps
+    return max(0.0, LOOP_RADII * gybing_radius_m(ctx) / max(_full_mps(ctx), LEAST_MPS) - turn_s)
+
+
+def _full_mps(ctx: StepContext) -> float:
+    wind = ctx.wind_mean
+    return 0.0 if wind is None else ctx.voyage.boat.polar.max_speed_mps(wind[1])
 
 
 def boards_within_m(ctx: StepContext) -> float | None:

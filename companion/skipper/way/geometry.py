@@ -16,6 +16,7 @@ BEAR_AWAY_RAD = math.radians(100.0)  # a beam reach with a little to spare: ever
 LOOK_M = 40.0  # water looked at on either side before bearing away
 AWAY_RADII = 4.0  # straight on for so far there is room to turn in, or water that goes on
 GYBE_RADIUS_M = 8.0  # a loop that a boat of a few metres turns in, with WP_RADIUS to spare
+LOOP_RADII = 2.0 * math.sqrt(2.0) + 2.0  # of its circle: the way of a loop, from its corner back to it
 LOOP_SHARE = 0.6  # of the way round from the course before a loop to that away from the leg after it
 
 
@@ -150,11 +151,17 @@ def is_tack(before_rad: float, after_rad: float, twd_from_rad: float) -> bool:
 
 
 def gybe_round(
-    start_en: PointEn, points: Sequence[PointEn], *, twd_from_rad: float, area: AreaLike, floor_m: float
+    start_en: PointEn,
+    points: Sequence[PointEn],
+    *,
+    twd_from_rad: float,
+    area: AreaLike,
+    floor_m: float,
+    radius_m: float,
 ) -> tuple[PointEn, ...]:
     """Return the waypoints with each tack replaced by a turn the other way round, where there is room for it.
 
-    The loop lies to leeward of the corner, two waypoints about a circle of ``GYBE_RADIUS_M``. The second is on the
+    The loop lies to leeward of the corner, two waypoints about a circle of ``radius_m``. The second is on the
     leg that follows, sailed back: so that leg is sailed on its own course however short it is.
     """
     out: list[PointEn] = []
@@ -167,8 +174,8 @@ def gybe_round(
                 turn = difference_rad(following, course)
                 off = math.copysign(LOOP_SHARE * (math.pi - abs(turn)), -turn)  # the other way round
                 loop = [
-                    moved(corner, course + off, math.sqrt(2.0) * GYBE_RADIUS_M),
-                    moved(corner, following + math.pi, 2.0 * GYBE_RADIUS_M),
+                    moved(corner, course + off, math.sqrt(2.0) * radius_m),
+                    moved(corner, following + math.pi, 2.0 * radius_m),
                 ]
                 if area.path_clearance_m([corner, *loop, points[n + 1]]) >= floor_m:
                     out.extend(loop)

@@ -8,13 +8,14 @@ import shapely
 
 from companion.boat.failed_tack import IRONS_S
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.autopilot_beats import tacks_fail
+from companion.skipper.planning.autopilot_beats import gybing_radius_m, tacks_fail
 from companion.skipper.step.actions import ReplanReason, RequestPlan
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import MOST_IRONS_S, MOST_LEE_MPS, Persisted
 from companion.skipper.step.state import Tacking
 from companion.skipper.watch.tacks import TACK_FAILED, watch_tacks
-from tests.skipper.test_voyage import make
+from companion.skipper.way.geometry import GYBE_RADIUS_M
+from tests.skipper.test_voyage import make, said
 from tests.skipper.world import with_parts
 
 ROCK = shapely.box(25.0, 35.0, 60.0, 120.0)
@@ -132,3 +133,35 @@ def test_how_she_lay_and_was_set_survives_a_restart_and_nonsense_does_not():
     for wrong in ([1.0], [math.nan, 0.0, 0.0], "abc", [1.0, True, 0.0], None):
         with pytest.raises(ValueError, match="damaged"):
             Persisted.from_dict(data | {"failed_tack": wrong})
+
+
+@pytest.mark.parametrize(
+    ("turn_degps", "radius_m", "loses_s"), [(45.0, GYBE_RADIUS_M, (5.0, 20.0)), (4.0, 41.0, (30.0, 60.0))]
+)
+def test_gybing_round_is_priced_as_it_is_sailed(turn_degps, radius_m, loses_s):
+    world = under_way(tried=4, failed=2, in_a_row=2)
+    boat = replace(world.skipper.voyage.boat, turn_rate_radps=math.radians(turn_degps))
+    world.skipper = replace(world.skipper, voyage=replace(world.skipper.voyage, boat=boat))
+    asked = {}
+    for in_a_row in (0, 2):
+        ctx = turn_of(world, tacking=replace(world.state.tacking, in_a_row=in_a_row, failed_s=world.t))
+        assert request(ctx, ReplanReason.ORDER)
+        [asked[in_a_row]] = [a.problem.boat for a in ctx.actions if isinstance(a, RequestPlan)]
+    assert gybing_radius_m(ctx) == pytest.approx(radius_m, rel=0.1)
+    assert asked[0].tack_loss_s == boat.tack_loss_s
+    assert loses_s[0] < asked[2].tack_loss_s < loses_s[1]
+
+
+def test_the_loops_of_a_boat_that_turns_slowly_are_of_her_own_circle():
+    world = make(obstacles=(), wind=lambda t: (0.0, 5.0), config={"no_go_patience_s": 1e9})
+    boat = replace(world.skipper.voyage.boat, turn_rate_radps=math.radians(8.0))
+    world.skipper = replace(world.skipper, voyage=replace(world.skipper.voyage, boat=boat))
+    assert world.run(60, lambda w: w.state.voyage.sailing)
+    world.state = with_parts(world.state, steering={"irons_s": (world.t - 60.0, world.t - 5.0)})
+    world.order("replan")
+    assert world.run(30, lambda w: said(w, "gybing round"))
+    world.run(3)
+    points = world.state.mission.route.points_en_m[world.state.mission.index : -1]
+    radius_m = gybing_radius_m(turn_of(world))
+    assert radius_m > 2.0 * GYBE_RADIUS_M
+    assert any(math.dist(a, b) == pytest.approx(2.0 * radius_m) for a, b in zip(points, points[2:], strict=False))

@@ -83,15 +83,15 @@ def test_double_conditions(boat, after, done):
 
 
 @CHECK
-@given(ANGLE, st.floats(0.75, 1.5), st.floats(4.0, 100.0), st.booleans())
-def test_gybe_round_turns_the_other_way_never_through_the_wind_and_ends_on_the_next_leg(twd, twa, next_m, port):
+@given(ANGLE, st.floats(0.75, 1.5), st.floats(4.0, 100.0), st.floats(8.0, 60.0), st.booleans())
+def test_gybe_round_turns_the_other_way_and_ends_on_the_next_leg(twd, twa, next_m, radius_m, port):
     side = 1.0 if port else -1.0
     before, after = twd - side * twa, twd + side * twa
     assert is_tack(before, after, twd)
     start = (0.0, 0.0)
     corner = moved(start, before, 100.0)
     end = moved(corner, after, next_m)
-    path = [start, *gybe_round(start, [corner, end], twd_from_rad=twd, area=area(), floor_m=5.0)]
+    path = [start, *gybe_round(start, [corner, end], twd_from_rad=twd, area=area(), floor_m=5.0, radius_m=radius_m)]
     assert len(path) == 5
     courses = [bearing_rad(a, b) for a, b in pairwise(path)]
     for one, two in pairwise(courses):
@@ -103,7 +103,7 @@ def test_gybe_round_turns_the_other_way_never_through_the_wind_and_ends_on_the_n
 def test_gybe_round_needs_room():
     start, corner, end = (0.0, 0.0), (-70.0, 70.0), (0.0, 140.0)
     rock = box(-100.0, 40.0, -80.0, 72.0)
-    out = gybe_round(start, [corner, end], twd_from_rad=0.0, area=area(rock), floor_m=8.0)
+    out = gybe_round(start, [corner, end], twd_from_rad=0.0, area=area(rock), floor_m=8.0, radius_m=8.0)
     assert out == (corner, end)
 
 
