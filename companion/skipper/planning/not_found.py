@@ -14,8 +14,9 @@ from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_way_clear, leads_there, too_risky, upload
 from companion.skipper.planning.vessels import lies_in_the_way, meetings
-from companion.skipper.step import DiversionKind
+from companion.skipper.step import DiversionKind, ReplanReason
 from companion.skipper.step.context import StepContext
+from companion.skipper.step.missions import roomy_m
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.way.drying import AHEAD_S
 from companion.skipper.way.geometry import distance_m
@@ -108,15 +109,17 @@ def _stays_as_it_is(ctx: StepContext, pending: PendingPlan) -> str:
 def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     """Keep the old plan while it is sound, else take the next step of the ladder, at last hold.
 
-    One that leads elsewhere than she is bound for, to the goals instead of a refuge, is kept at the ladder's end only.
+    One that leads elsewhere than she is bound for, to the goals instead of a refuge, or that ends short of them where a
+    loiter has too little room, is kept at the ladder's end only.
     """
     ladder = steps(ctx)
     state = ctx.state
     where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
     met = meetings(ctx) if state.mission.route is not None else ()
-    is_last, is_alike = pending.rung + 1 >= len(ladder), _is_bound_alike(ctx)
+    is_last, is_cramped = pending.rung + 1 >= len(ladder), _ends_cramped(ctx, pending)
+    is_to_stay = _is_bound_alike(ctx) and not is_cramped
     if (
-        ((pending.rung == 0 and is_alike) or (is_last and not is_alike) or leads_there(ctx, pending))
+        ((pending.rung == 0 and is_to_stay) or (is_last and not is_to_stay) or leads_there(ctx, pending))
         and state.mission.route is not None
         and not met
         and is_on_board_sound(ctx)
@@ -131,7 +134,7 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         _wait_against(ctx, pending, foul, count=len(ladder))
         return
     # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
-    keeps = pending.rung == 0 and state.mission.route is not None and _tail_only(ctx)
+    keeps = is_cramped or (pending.rung == 0 and state.mission.route is not None and _tail_only(ctx))
     from_index = pending.from_index if keeps else None
     if pending.rung + 1 < len(ladder):
         following = ladder[pending.rung + 1].name
@@ -189,6 +192,15 @@ def _is_bound_alike(ctx: StepContext) -> bool:
     if is_refuge and ctx.state.plans.retry.failures + 1 < len(ctx.voyage.refuges):
         return True  # margin is given up for one when none has a way with all of it
     return is_led_to(ctx, bound)
+
+
+def _ends_cramped(ctx: StepContext, pending: PendingPlan) -> bool:
+    """Return whether the mission ends with goals left, for which this was to be the plan, where a loiter lacks room."""
+    route = ctx.state.mission.route
+    if route is None or pending.reason is not ReplanReason.NEXT_GOAL or pending.from_index is None:
+        return False
+    has_m = float(ctx.to_stay_in.area.clearance_m([route.points_en_m[-1]])[0])
+    return has_m < roomy_m(ctx.known_config) - LACK_M
 
 
 def _foul(ctx: StepContext, pending: PendingPlan) -> str:

@@ -392,3 +392,20 @@ def test_margin_is_given_up_for_a_refuge_when_none_has_a_way_with_all_of_it(coun
     ctx.actions.clear()
     not_found(ctx, ctx.state.pending.plan, "none")
     assert any(isinstance(a, RequestPlan) for a in ctx.actions) is not stays
+
+
+@pytest.mark.parametrize(
+    ("rock_m", "rung", "stays"), [(14.0, 0, False), (14.0, 1, False), (14.0, -1, True), (60.0, 0, True)]
+)
+def test_a_way_that_ends_without_room_is_led_on_with_less_margin_before_she_lies_there(rock_m, rung, stays):
+    """In a pocket "the old one is sound and stays" was said until she lay in its loiter, and came to 5.4 m of 6."""
+    goals = tuple(Goal(name=name, en_m=(0.0, north_m)) for name, north_m in (("A", 200.0), ("B", 400.0)))
+    rock = shapely.box(rock_m, 190.0, rock_m + 4.0, 210.0)
+    way = route((0.0, 100.0), (0.0, 200.0), (0.0, 200.0), gate_of=(-1, 0, -1))
+    ctx = moment(way, goals=goals, obstacles=(rock,), heading_deg=0.0, twd_deg=90.0)
+    assert request(ctx, ReplanReason.NEXT_GOAL, from_index=1, rung=rung % len(steps(ctx)))
+    ctx.actions.clear()
+    not_found(ctx, ctx.state.pending.plan, "none")
+    asked = [a for a in ctx.actions if isinstance(a, RequestPlan)]
+    assert not asked if stays else [a.from_seq for a in asked] == [2]
+    assert any("the old one is sound and stays" in a.text for a in ctx.actions if isinstance(a, Announce)) is stays
