@@ -90,21 +90,26 @@ def foreknown(wind: WindModel, estimator: Estimator) -> WindTracker:
 # ------------------------------------------------------------------------------------- guidance and planner
 GUIDANCES = ("plan", "heading", "field")  # [skipper] guidance
 PLANNERS = tuple(ALGORITHMS)  # [skipper] planner
-DRAWABLE = ("guidance", "planner")
+DRAWABLE = ("guidance", "planner", "station")
+STATION_SHARE = 0.5  # of the voyages
+STATION_S = (20.0, 90.0)  # how long a station that is drawn is kept at the last goal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Method:
-    """By which guidance, and which planner's plans, a mission is sailed; None: as it says itself."""
+    """By which guidance and planner a mission is sailed, and how long she stays at its end; None: as it says itself."""
 
     guidance: str | None = None
     planner: str | None = None
+    station_s: float | None = None
 
     @property
     def description(self) -> str:
         """The method in words, empty where the mission's own is sailed."""
         guidance = "" if self.guidance is None else "in AUTO" if self.guidance == "plan" else f"by {self.guidance}"
-        return ", ".join(part for part in (guidance, f"planner {self.planner}" if self.planner else "") if part)
+        planner = f"planner {self.planner}" if self.planner else ""
+        station = f"{self.station_s:.0f} s on a station" if self.station_s else ""
+        return ", ".join(part for part in (guidance, planner, station) if part)
 
     def variation(self, mission: Mission, also: Variation | None = None) -> Variation | None:
         """Return ``also`` with this method; None where nothing is another. GUIDED is permitted where it is needed.
@@ -120,6 +125,8 @@ class Method:
             tables.setdefault("skipper", {})["planner"] = self.planner
             if self.planner != mission.skipper.planner:
                 tables["planner"] = dict.fromkeys(mission.options.planner.__struct_fields__)
+        if self.station_s is not None:
+            tables.setdefault("skipper", {})["station_s"] = self.station_s
         return Variation(tables=tables, room=also.room if also is not None else None) if tables else also
 
 
@@ -129,7 +136,9 @@ AS_IT_SAYS = Method()
 def drawn_method(rng: random.Random, what: Sequence[str], mission: Mission) -> Method:
     """Return a method for a mission: ``what`` of ``DRAWABLE`` is drawn, of those that it can be sailed by."""
     guidance = rng.choice([g for g in GUIDANCES if not why_not(mission, g)]) if "guidance" in what else None
-    return Method(guidance=guidance, planner=rng.choice(PLANNERS) if "planner" in what else None)
+    planner = rng.choice(PLANNERS) if "planner" in what else None
+    is_kept = "station" in what and rng.random() < STATION_SHARE
+    return Method(guidance=guidance, planner=planner, station_s=round(rng.uniform(*STATION_S), 1) if is_kept else None)
 
 
 def why_not(mission: Mission, guidance: str) -> str:

@@ -53,7 +53,7 @@ def seeds_of(args: argparse.Namespace) -> Seeds:
 
 
 def add_draw(parser: argparse.ArgumentParser, more: Mapping[str, str] = MappingProxyType({})) -> None:
-    """Add ``--draw``, of guidance and planner and of ``more``: what each of them is, in words."""
+    """Add ``--draw``, of guidance, planner and station, and of ``more``: what each of them is, in words."""
     words = "".join(f", {name} ({told})" for name, told in more.items())
     parser.add_argument(
         "--draw",
@@ -61,8 +61,8 @@ def add_draw(parser: argparse.ArgumentParser, more: Mapping[str, str] = MappingP
         default=(),
         metavar="WHAT[,WHAT]",
         help="draw from each seed, too: guidance (in AUTO, by heading, by field), planner ("
-        f"{', '.join(ALGORITHMS)}){words}; all: each of these; what else a seed is stays the same "
-        "(default: as the mission says)",
+        f"{', '.join(ALGORITHMS)}), station (kept for a while at the last goal){words}; all: each of these; what else "
+        "a seed is stays the same (default: as the mission says)",
     )
 
 

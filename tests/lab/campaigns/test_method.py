@@ -39,6 +39,7 @@ def methods():
 
 def test_each_guidance_with_each_planner_comes_and_a_seed_is_one_of_them(methods):
     assert {(m.guidance, m.planner) for m in methods} == {(g, p) for g in GUIDANCES for p in PLANNERS}
+    assert {m.station_s is None for m in methods} == {True, False}
     assert drawn_of(7, load_scenario(BASE)) == methods[7]
 
 
@@ -46,6 +47,7 @@ def test_what_is_not_asked_for_is_the_missions_own():
     scenario = load_scenario(BASE)
     assert drawn_of(7, scenario, ()) == Method()
     assert Method().variation(mission("demo")) is None
+    assert drawn_of(7, scenario, ("guidance",)).station_s is None
     assert drawn_of(7, scenario, ("planner",)).guidance is None
 
 
@@ -57,7 +59,10 @@ def test_who_may_not_steer_is_sailed_by_plan():
 def test_a_method_is_a_missions_keys_and_guided_is_permitted_for_it():
     demo = mission("demo")
     planned = Variation(tables={"skipper": {"autopilot_beats": False}})
-    changed = Method(guidance="heading", planner="astar").variation(demo, planned).mission(demo)
+    method = Method(guidance="heading", planner="astar", station_s=30.0)
+    assert method.description == "by heading, planner astar, 30 s on a station"
+    changed = method.variation(demo, planned).mission(demo)
+    assert changed.options.skipper.station_s == 30.0
     assert (changed.skipper.guidance, changed.skipper.planner, changed.skipper.autopilot_beats) == (
         "heading",
         "astar",
@@ -92,7 +97,9 @@ def test_a_campaign_says_what_a_mission_cannot_be_sailed_by():
 
 
 def test_a_faulty_voyage_is_the_same_but_for_what_is_drawn_of_the_boat(methods):
-    seed = next(n for n, m in enumerate(methods) if m.guidance == "heading" and m.planner == "auto")
+    seed = next(
+        n for n, m in enumerate(methods) if m.guidance == "heading" and m.planner == "auto" and m.station_s is None
+    )
     record, plain = sail(job_of(seed, FaultCase(draws=DRAWABLE))), draw(seed, load_scenario(BASE))
     assert record["method"] == "by heading, planner auto"
     assert record["events"] == [event_text(event) for event in plain.events]
@@ -106,10 +113,10 @@ def test_results_of_the_default_keep_their_keys():
 
     plain, drawn = (key(faults(FaultCase(draws=draws), runs=1)) for draws in ((), DRAWABLE))
     assert "draws" not in plain
-    assert drawn == {**plain, "draws": "guidance, planner"}
+    assert drawn == {**plain, "draws": "guidance, planner, station"}
     plain, drawn = (key(mismatch(MismatchCase(draws=draws), runs=1, first_seed=3)) for draws in ((), DRAWABLE))
     assert "draws" not in plain
-    assert drawn == {**plain, "draws": "guidance, planner"}
+    assert drawn == {**plain, "draws": "guidance, planner, station"}
     assert set(key(campaign([HERE / "demo.toml"], runs=1))) == {"scenario", "hash", "seed"}
 
 
@@ -118,7 +125,7 @@ def test_the_options():
     add_draw(parser)
     add_methods(parser)
     assert parser.parse_args([]).draw == ()
-    assert parser.parse_args(["--draw", "planner, guidance"]).draw == DRAWABLE
+    assert parser.parse_args(["--draw", "planner, guidance"]).draw == ("guidance", "planner")
     assert parser.parse_args(["--draw", "all"]).draw == DRAWABLE
     assert methods_of(None, None) == [Method()]
     args = parser.parse_args(["--guidance", "plan", "heading", "--planner", "astar"])
