@@ -49,6 +49,8 @@ def choose(
     """Return the heading of the fan with the least cost, its margin [m], and the side to pass what stands still on."""
     if not situation.obstacles and intent.stay_in is None and intent.clearance is None:
         return wanted_rad, None, 0
+    if state.failed_tacks:
+        habits = replace(habits, tack_min_mps=math.inf)
     headings = _fan(wanted_rad, twd, habits)
     track, lost_s = foresee(headings, twd, situation, habits)
     cost = 1.0 - np.cos(headings - wanted_rad) + 0.02 * lost_s
@@ -200,7 +202,7 @@ def foresee(
     """Return where each heading (k,) takes the boat: (k, t, 2) [m], and the time each loses by turning (k,) [s].
 
     The way through the water turns with the bow, evenly over that time, and its speed becomes that of the new heading:
-    so a turn looks the same from the middle of it as from its beginning.
+    so a turn looks the same from the middle of it as from its beginning. Who does not tack turns by the stern.
     """
     way = wrap_pi_array(headings - situation.heading_rad)
     lost = np.abs(way) / habits.turn_rate_radps
@@ -211,7 +213,12 @@ def foresee(
         twa = wrap_pi_array(twd - headings)
         now = wrap_pi(twd - situation.heading_rad)
         speed = np.interp(np.abs(twa), habits.polar_twa_rad, habits.polar_mps)
-        lost = lost + np.where((twa * now < 0.0) & (np.abs(twa - now) < math.pi), habits.tack_s, 0.0)
+        tacks = (twa * now < 0.0) & (np.abs(twa - now) < math.pi)
+        if math.isinf(habits.tack_min_mps):
+            way = np.where(tacks, way - np.copysign(2.0 * math.pi, way), way)
+            lost = np.abs(way) / habits.turn_rate_radps
+        else:
+            lost = lost + np.where(tacks, habits.tack_s, 0.0)
         drift = habits.leeway_share * situation.tws_mps
         leeway = -drift * np.array([math.sin(twd), math.cos(twd)])
     carried = leeway + np.asarray(situation.current_en_mps)

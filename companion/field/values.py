@@ -74,8 +74,9 @@ class GuidanceSettings:
     """What the boat can do, and how careful to be.
 
     ``polar_mps`` is the speed at ``polar_twa_rad`` (rising, 0..π) in the present wind. ``tack_s`` is how long a tack
-    takes and ``tack_min_mps`` the way it needs; ``lag_s`` how long the boat takes to gather the new speed.
-    ``comfort_m`` outside an obstacle's disc still costs a little, and so does crossing ahead of it (``ahead_cost``).
+    takes and ``tack_min_mps`` the way it needs (inf: it never tacks); ``lag_s`` how long the boat takes to gather the
+    new speed. ``comfort_m`` outside an obstacle's disc still costs a little, and so does crossing ahead of it
+    (``ahead_cost``).
     """
 
     is_sailing: bool = True

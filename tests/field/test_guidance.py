@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from companion.field.guidance import LastResort, avoiding, follow_line, go_to, helm, hold_heading, step
 from companion.field.look_ahead import foresee, margins
@@ -225,6 +226,36 @@ def test_a_turn_looks_the_same_from_the_middle_of_it() -> None:
     after, left = foresee(np.array([math.radians(170.0)]), 0.0, middle, habits)
     assert left[0] == pytest.approx(lost[0] - half_s)
     assert np.hypot(*(after[0, :-1] - track[0, 1:]).T).max() < 0.5
+
+
+def test_who_does_not_tack_is_foreseen_to_turn_by_the_stern() -> None:
+    """Beside a lee wall a boat that cannot tack was seen to turn away from it, and wore round onto it."""
+    headings, wanted = np.array([math.radians(-60.0), math.radians(100.0)]), math.radians(240.0)
+    never = replace(HABITS, tack_min_mps=math.inf)
+    tacked, quick_s = foresee(headings, 0.0, seen(60.0), HABITS)
+    worn, lost_s = foresee(headings, 0.0, seen(60.0), never)
+    assert lost_s[0] == pytest.approx(wanted / HABITS.turn_rate_radps)
+    assert quick_s[0] == pytest.approx((2.0 * math.pi - wanted) / HABITS.turn_rate_radps + HABITS.tack_s)
+    assert tacked[0, :, 1].min() == 0.0
+    assert worn[0, :, 1].min() < -10.0
+    assert np.array_equal(tacked[1], worn[1])
+
+
+def test_beside_a_lee_shore_who_does_not_tack_does_not_turn_towards_it() -> None:
+    """Nor does one whose tack has failed: she wears round, too."""
+
+    def off_wall(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.asarray(points[:, 1] + 12.0)
+
+    back = replace(go_to((-100.0, 60.0), 0.0), clearance=off_wall)
+    for never, state in (
+        (replace(HABITS, tack_min_mps=math.inf), GuidanceState()),
+        (HABITS, GuidanceState(failed_tacks=1)),
+    ):
+        after, told = step(state, seen(75.0), back, never)
+        assert 0.0 < told.heading_rad < math.radians(90.0)
+        assert after.manoeuvre is Manoeuvre.SAIL
+    assert step(GuidanceState(), seen(75.0), back, HABITS)[0].manoeuvre is Manoeuvre.TACK
 
 
 def test_an_obstacle_that_comes_repels_from_astern_too() -> None:
