@@ -16,7 +16,9 @@ from companion.skipper.planning.track import steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_way_clear
 from companion.skipper.step import Guidance, StepContext
 from companion.skipper.step.state import Fallback, PendingPlan, Retry
-from companion.skipper.way import PointEn
+from companion.skipper.way import PointEn, distance_m
+
+STAYS_M = 25.0  # of a place where she is to stay: boards and loops of a station keep within
 
 
 def may_fall_back(ctx: StepContext) -> bool:
@@ -78,11 +80,14 @@ def is_planned_since(ctx: StepContext, since_s: float) -> bool:
 def to_go(ctx: StepContext) -> tuple[PointEn, ...]:
     """Return the places between the boat and the end of her way: the mission's on board, or where a field leads her.
 
-    A field makes for the goals themselves, past whatever waypoints are on board.
+    A field makes for the goals themselves, past whatever waypoints are on board. About a place where she is to stay
+    there is no more way to go.
     """
     if not ctx.is_field_steered or is_composed(ctx):
         return ctx.ahead()
-    bound = diversion(ctx)
+    bound, boat = diversion(ctx), ctx.boat_en
     if bound is not None:
-        return (bound.en_m,) if bound.has_place else ()
+        if not bound.has_place or (boat is not None and distance_m(boat, bound.en_m) < max(STAYS_M, bound.radius_m)):
+            return ()
+        return (bound.en_m,)
     return () if ctx.state.voyage.over else tuple(gate.en_m for gate in ctx.gates[ctx.state.progress.gate :])

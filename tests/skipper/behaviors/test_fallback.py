@@ -12,7 +12,9 @@ from companion.messages import Mode
 from companion.planner import plan
 from companion.planner.plan import Plan, PlanStatus
 from companion.skipper.behaviors.fallback import follow_fallback
+from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.fallback import to_go
+from companion.skipper.step import DiversionKind
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, Guidance
 from companion.skipper.step.state import Fallback
@@ -86,6 +88,17 @@ def test_by_field_way_is_made_good_towards_the_goals_and_not_the_waypoints_on_bo
     way = route((90.0, 0.0), (0.0, 600.0), (600.0, 600.0), (600.0, 600.0), gate_of=(-1, 0, 1, -1))
     assert to_go(moment(way, config={"guidance": Guidance.FIELD})) == ((0.0, 600.0), (600.0, 600.0))
     assert to_go(moment(way)) == way.points_en_m[:-1]
+
+
+@pytest.mark.parametrize(("north_m", "left"), [(580.0, 0), (540.0, 1)])
+def test_by_field_no_way_is_to_go_about_a_station(north_m, left):
+    """ "no progress: a plan is asked for" was said every few minutes of a boat that kept her station by 3 m."""
+    way = route((0.0, 300.0), (0.0, 600.0), (0.0, 600.0), gate_of=(-1, 0, -1))
+    goals = (Goal(name="G", en_m=(0.0, 600.0)),)
+    config = {"guidance": Guidance.FIELD, "station_s": 600.0}
+    ctx = moment(way, goals=goals, at=(0.0, north_m), config=config, progress={"gate": 1})
+    assert diversion(ctx).kind is DiversionKind.STATION
+    assert len(to_go(ctx)) == left
 
 
 @pytest.mark.parametrize(("gate", "goal", "lasts"), [(0, 0, True), (1, 0, False), (1, 1, True)])
