@@ -10,6 +10,7 @@ import shapely
 from companion.frozen import changed
 from companion.messages import Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
+from companion.skipper.planning.tides import dries_under
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, ReplanReason
 from companion.skipper.step.context import FRESH_S, StepContext
@@ -106,7 +107,7 @@ def pass_gates(ctx: StepContext) -> None:
 
 
 def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
-    """Count the time in a box from entry on; True when it is over, or it was told to go on."""
+    """Count the time in a box from entry on; True when it is over, it was told to go on, or the box dries."""
     box, inside = gate.box, ctx.state.progress.inside
     assert box is not None
     if inside is None or inside.goal != gate.goal:
@@ -116,7 +117,8 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
         ctx.set(progress=changed(ctx.state.progress, inside=inside))
         ctx.say(Severity.NOTICE, "box", f"{gate.name} entered", every_s=0.0)
     is_told = ctx.state.progress.released == gate.goal
-    if stay_left_s(ctx, gate) > 0.0 and not is_told:
+    dries = dries_under(ctx, gate.en_m)
+    if stay_left_s(ctx, gate) > 0.0 and not is_told and not dries:
         return False
     ctx.set(
         progress=changed(
@@ -127,7 +129,7 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
             inside=None,
         )
     )
-    why = "told to go on" if is_told else "her time is over"
+    why = "told to go on" if is_told else f"{dries} is about to dry" if dries else "her time is over"
     ctx.say(
         Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(ctx.t_s, ctx.utc_s):.0f} s in it", every_s=0.0
     )

@@ -17,13 +17,13 @@ from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.asking import lacks
 from companion.skipper.planning.diversions import home_trouble, refuges_by_way
 from companion.skipper.planning.not_found import hold
-from companion.skipper.planning.tides import closes_ahead, opens_next
+from companion.skipper.planning.tides import closes_ahead, dries_under, opens_next
 from companion.skipper.step import StepContext
 from companion.skipper.step.actions import RequestPlan, UploadMission
 from companion.skipper.step.missions import loiter_place
 from companion.skipper.way.drying import DryingWater
 from companion.skipper.way.shoals import RISES_M, Shoal, still_shoal
-from companion.skipper.way.voyage import Goal, Refuge
+from companion.skipper.way.voyage import Box, Goal, Refuge
 from tests.skipper.moments import moment, route
 from tests.skipper.test_voyage import is_done, make, said
 
@@ -34,12 +34,12 @@ FLAT = DryingWater(name="the flat", polygon=box(-400.0, 500.0, 400.0, 1400.0), m
 BAR = DryingWater(name="the bar", polygon=box(-400.0, 130.0, 400.0, 170.0), margin_m=0.0, opens_at_m=1.0)
 
 
-def voyage_over_a_bar(*heights, bar=BAR, **config):
+def voyage_over_a_bar(*heights, bar=BAR, goals=(GOAL,), **config):
     """Return a voyage across a bar by a table of ``heights`` (seconds after the start, metres), with a row an hour."""
     times, levels = zip(*heights, strict=True)
     every = sorted({*times, *np.arange(times[0], times[-1], 3600.0).tolist()})
     rows = tuple(TideRow(utc_s=UTC_S + t, height_m=float(np.interp(t, times, levels))) for t in every)
-    world = make(GOAL, obstacles=(), wind=lambda t: (EAST, 5.0), config={"tide": TideTable(rows=rows), **config})
+    world = make(*goals, obstacles=(), wind=lambda t: (EAST, 5.0), config={"tide": TideTable(rows=rows), **config})
     world.skipper = replace(world.skipper, voyage=replace(world.skipper.voyage, drying=(bar,)))
     world.shown |= {"utc_at_boot_s": UTC_S - world.boot_s}
     return world
@@ -151,6 +151,43 @@ def test_she_does_not_stay_in_the_middle_of_a_long_flat_and_goes_to_no_refuge_on
     status = replace(now.snapshot.autopilot, home=now.voyage.frame.geo_from_en(0.0, 800.0))
     now.snapshot = replace(now.snapshot, autopilot=status)
     assert home_trouble(now) == "home is not in free water but in the flat, which dries: the margin's floor is 8 m"
+
+
+def test_her_stay_in_a_box_ends_in_time_before_it_dries():
+    """She loitered in it for its 2,600 s, and grounded after 1,500."""
+    stay = Goal(en_m=(0.0, 550.0), name="the box", box=Box(area_en=box(-50.0, 500.0, 50.0, 600.0), for_s=2600.0))
+    home = Goal(en_m=(0.0, 300.0), radius_m=6.0, name="the goal")
+    world = voyage_over_a_bar((-1000.0, 4.0), (3000.0, 0.0), bar=FLAT, goals=(stay, home))
+    closes_s = FLAT.closed_s(world.skipper.config.tide, UTC_S)[0][0]
+    assert world.run(1500, lambda w: said(w, "goal"))
+    (told,) = [a.text for _, a in world.actions if getattr(a, "code", "") == "goal"]
+    assert "the flat is about to dry" in told
+    assert world.t < closes_s - 120.0
+    assert world.run(600, is_done)
+    assert world.state.progress.reached == (0, 1)
+
+
+@pytest.mark.parametrize(
+    ("north_m", "below_s", "leaves"),
+    [
+        (510.0, -100.0, True),
+        (510.0, 200.0, False),
+        (900.0, 200.0, True),
+        (900.0, 1200.0, False),
+        (450.0, -100.0, False),
+    ],
+)
+def test_what_dries_is_left_sooner_the_longer_the_way_out_of_it_is(north_m, below_s, leaves):
+    rows = tuple(TideRow(utc_s=t, height_m=1.0 - (t - below_s) / 3600.0) for t in (-3600.0, 0.0, 3600.0))
+    now = moment(route((0.0, 400.0)))
+    now = StepContext(
+        replace(now.voyage, drying=(FLAT,)),
+        replace(now.config, tide=TideTable(rows=rows), margin_m=10.0, margin_floor_m=10.0),
+        now.state,
+        now.snapshot,
+    )
+    now.utc_s = 0.0
+    assert dries_under(now, (0.0, north_m)) == ("the flat" if leaves else "")
 
 
 def test_who_steers_by_what_is_about_her_keeps_out_of_what_opens_soon():

@@ -17,6 +17,10 @@ from companion.skipper.way.drying import DryingWater, TimedWater, timed
 from companion.traffic.plans import TimedLeg
 
 DAY_S = 86_400.0
+LEAVES_S, LEAVES_MPS = (
+    120.0,
+    0.5,
+)  # what leaving water that is about to dry takes: a plan and a turn, and a slow way out
 
 
 def told(ctx: StepContext, start_en: PointEn, after_s: float, margin_m: float) -> TimedWater:
@@ -48,6 +52,22 @@ def closes_ahead(ctx: StepContext) -> Closes | None:
     here = shapely.points(boat)
     left = [w for w in waters if float(shapely.distance(w.polygon, here)) > floor_m]  # else she has to come out of it
     return first_met(timed_legs(ctx), left, ctx, floor_m)
+
+
+def dries_under(ctx: StepContext, place_en: PointEn) -> str:
+    """Return which water that dries a boat who stays at a place has to leave by now, empty: none.
+
+    It is left in time to sail out of it, slowly, before it may be too shallow.
+    """
+    place, floor_m = shapely.points(place_en), min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    for water in ctx.voyage.drying:
+        if float(shapely.distance(water.polygon, place)) > floor_m:
+            continue
+        windows = water.doubtful_s(ctx.config.tide, ctx.utc_s)
+        out_m = floor_m + float(shapely.distance(water.polygon.exterior, place))
+        if windows and windows[0][0] < LEAVES_S + out_m / LEAVES_MPS:
+            return water.name
+    return ""
 
 
 def first_met(
