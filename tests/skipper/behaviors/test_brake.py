@@ -9,12 +9,16 @@ import shapely
 from companion.messages import Mode
 from companion.planner import plan
 from companion.skipper.behaviors.headings import ahead_of
+from companion.skipper.behaviors.sailing import _plan_and_resume, _stay
 from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
+from companion.skipper.step import Diversion, DiversionKind
 from companion.skipper.step import actions as act
 from companion.skipper.step.actions import ReplanReason
 from companion.skipper.step.snapshot import PlanOutcome
+from companion.skipper.step.state import Retry
 from companion.skipper.way.voyage import Goal
+from tests.skipper.moments import moment, route
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import FAST, is_done, is_sailing, make, nothing, said
 from tests.skipper.world import World, skipper, voyage, with_parts
@@ -22,6 +26,11 @@ from tests.skipper.world import World, skipper, voyage, with_parts
 ISLAND = shapely.box(-60.0, 100.0, 60.0, 130.0)
 GOAL = Goal(en_m=(0.0, 300.0), radius_m=8.0)
 BEAM = lambda t: (-math.pi / 2.0, 5.0)  # noqa: E731 - a wind
+
+
+def lying():
+    """Return a route of which the loiter at its end is left, south of the island."""
+    return route((0.0, 40.0), (0.0, 40.0))
 
 
 def handed_back(away_m, **how):
@@ -76,6 +85,32 @@ def test_inside_of_what_is_drawn_the_way_out_is_not_braked(towards, is_braked):
     )
     ctx.state = with_parts(ctx.state, mission={"route": route, "index": 0})
     assert (ahead_of(ctx) is not None) is is_braked
+
+
+@pytest.mark.parametrize(("north_m", "obstacles", "is_met"), [(142.0, (ISLAND,), True), (142.0, (), False)])
+def test_the_way_back_to_the_last_loiter_is_looked_at_as_a_leg_is(north_m, obstacles, is_met):
+    """No leg of the mission is left when she lies at its end, and the autopilot sails straight back to it."""
+    ctx = moment(lying(), at=(0.0, north_m), heading_deg=180.0, twd_deg=90.0, obstacles=obstacles, mission={"index": 1})
+    assert not ctx.ahead()
+    assert (ahead_of(ctx) is not None) is is_met
+
+
+@pytest.mark.parametrize("obstacles", [(ISLAND,), ()])
+def test_stopped_before_a_wall_she_is_not_given_back_to_the_loiter_behind_it_without_a_plan(obstacles):
+    stopped = {"steering": {"own_mode": Mode.LOITER}, "plans": {"retry": Retry(failures=1, not_before_s=1e9)}}
+    ctx = moment(lying(), at=(0.0, 170.0), twd_deg=90.0, obstacles=obstacles, mission={"index": 1}, **stopped)
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mode=Mode.LOITER))
+    _plan_and_resume(ctx)
+    assert ("sailing on" in ctx.state.why) is (not obstacles)
+    assert bool(ctx.actions) is (not obstacles)
+
+
+@pytest.mark.parametrize("obstacles", [(ISLAND,), ()])
+def test_to_stay_where_she_is_she_gets_a_loiter_on_this_side_of_the_wall(obstacles):
+    ctx = moment(lying(), at=(0.0, 170.0), twd_deg=90.0, obstacles=obstacles, mission={"index": 1})
+    _stay(ctx, Diversion(kind=DiversionKind.STAY, name="", why="told to"))
+    sent = [a for a in ctx.actions if isinstance(a, act.UploadMission)]
+    assert bool(sent) is bool(obstacles)
 
 
 def test_without_permission_the_plan_is_all_there_is():
