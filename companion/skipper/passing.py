@@ -10,10 +10,12 @@ import shapely
 from companion.frozen import changed
 from companion.messages import Severity
 from companion.skipper.behaviors.field_guidance import has_sailed
+from companion.skipper.planning.diversions import LACK_M
 from companion.skipper.planning.tides import dries_under
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, ReplanReason
 from companion.skipper.step.context import FRESH_S, StepContext
+from companion.skipper.step.missions import roomy_m
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, has_come_round, is_on_wrong_side
 from companion.skipper.way.geometry import distance_m, leg_distance_m
@@ -24,6 +26,7 @@ from companion.skipper.way.voyage import PointEn, Search
 GAP_S = 2.0 + FRESH_S  # between two fixes that belong together
 AT_MOST = 4  # rounds: the sweeps, and what they left; the wind's own anew are not counted
 HAIR_M = 0.5
+DECIDES_M = 100.0  # so near to a box she decides whether she can stay in it: later the way out of it may have no room
 COUNTED_M = 30.0
 WIDE_RAD = math.radians(60.0)  # by headings corners are cut within the grid size, which is wider than a buoy's circle
 UPON_M = 6.0  # before a line: a waypoint close beyond it may be left, or said to be left, a moment before she crosses
@@ -107,18 +110,19 @@ def pass_gates(ctx: StepContext) -> None:
 
 
 def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
-    """Count the time in a box from entry on; True when it is over, it was told to go on, or the box dries."""
+    """Count the time in a box from entry on; True when it is over, it was told to go on, or she cannot stay there."""
     box, inside = gate.box, ctx.state.progress.inside
     assert box is not None
     if inside is None or inside.goal != gate.goal:
         if not shapely.covers(box.area_en, shapely.points(boat)):
+            _leave_out(ctx, gate, boat)
             return False
         inside = Inside(goal=gate.goal, t_s=ctx.t_s, utc_s=ctx.utc_s)
         ctx.set(progress=changed(ctx.state.progress, inside=inside))
         ctx.say(Severity.NOTICE, "box", f"{gate.name} entered", every_s=0.0)
     is_told = ctx.state.progress.released == gate.goal
-    dries = dries_under(ctx, gate.en_m)
-    if stay_left_s(ctx, gate) > 0.0 and not is_told and not dries:
+    ends = _cannot_stay(ctx, gate)
+    if stay_left_s(ctx, gate) > 0.0 and not is_told and not ends:
         return False
     ctx.set(
         progress=changed(
@@ -129,11 +133,42 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
             inside=None,
         )
     )
-    why = "told to go on" if is_told else f"{dries} is about to dry" if dries else "her time is over"
+    why = "told to go on" if is_told else ends or "her time is over"
     ctx.say(
-        Severity.NOTICE, "goal", f"{gate.name}: {why} after {inside.age_s(ctx.t_s, ctx.utc_s):.0f} s in it", every_s=0.0
+        Severity.WARNING if ends else Severity.NOTICE,
+        "goal",
+        f"{gate.name}: {why} after {inside.age_s(ctx.t_s, ctx.utc_s):.0f} s in it",
+        every_s=0.0,
     )
     return True
+
+
+def _leave_out(ctx: StepContext, gate: Gate, boat: PointEn) -> None:
+    """Give up a box that she comes to and cannot stay in, for the goal behind it."""
+    following = gate.goal + 1
+    if following >= len(ctx.voyage.legs) or distance_m(boat, gate.en_m) > DECIDES_M:
+        return
+    why = _cannot_stay(ctx, gate)
+    if not why:
+        return
+    ctx.say(Severity.WARNING, "box", f"{gate.name} is given up: {why}", every_s=0.0)
+    ctx.let_go_of_plan()
+    ctx.approach(Approach(goal=following, en_m=boat))
+    ctx.set(
+        orders=changed(ctx.state.orders, skipped=ctx.state.orders.skipped + 1),
+        plans=changed(ctx.state.plans, asked=f"{gate.name} is given up", asked_as=ReplanReason.NEXT_GOAL),
+    )
+
+
+def _cannot_stay(ctx: StepContext, gate: Gate) -> str:
+    """Return why she cannot stay in a box any longer, empty: she can."""
+    dries = dries_under(ctx, gate.en_m)
+    if dries:
+        return f"{dries} is about to dry"
+    needs_m, has_m = roomy_m(ctx.known_config), float(ctx.voyage.area.clearance_m([gate.en_m])[0])
+    if needs_m - has_m > LACK_M:
+        return f"a loiter takes {needs_m:.0f} m to each side in this wind, and has {has_m:.0f}"
+    return ""
 
 
 def _is_before(gate: Gate, boat: PointEn) -> bool:

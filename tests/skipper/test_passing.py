@@ -434,6 +434,26 @@ def test_in_a_box_without_a_time_she_stays_until_told():
     assert w.run(300.0, lambda w: w.state.phase is Phase.DONE)
 
 
+@pytest.mark.parametrize(
+    ("winds_mps", "enters", "why"),
+    [
+        ((4.0, 4.0), True, "her time is over"),
+        ((4.0, 12.0), True, "a loiter takes"),
+        ((12.0, 12.0), False, "a loiter takes"),
+    ],
+)
+def test_in_a_dock_she_stays_while_a_loiter_has_room_in_that_wind(winds_mps, enters, why):
+    """In 12 m/s she swung from wall to wall for the five minutes of her stay, and touched."""
+    walls = [shapely.box(-40.0, 40.0, 40.0, 60.0), *(shapely.box(e, 60.0, e + 14.0, 140.0) for e in (-40.0, 26.0))]
+    made = skipper(voyage(box(for_s=200.0), END, obstacles=walls), margin_m=6.0, margin_floor_m=4.0)
+    w = World(skipper=made, wind=lambda t: (math.pi / 2.0, winds_mps[t > 150.0]))
+    assert w.run(400.0, lambda w: bool(w.state.progress.reached))
+    told = said(w, "box") + said(w, "goal")
+    assert ("box entered" in told) is enters
+    assert why in told[int(enters)]
+    assert (w.state.progress.reached == (0,)) is enters
+
+
 def test_the_time_in_a_box_is_counted_on_over_a_restart():
     w = world(box(for_s=200.0), END, shown={"utc_at_boot_s": UTC_AT_BOOT})
     w.run(200.0, lambda w: bool(said(w, "box")))
