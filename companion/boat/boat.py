@@ -110,6 +110,11 @@ class Boat:
         if self.gybe_room_m is not None and not (math.isfinite(self.gybe_room_m) and self.gybe_room_m >= 0.0):
             raise ValueError(f"gybe_room_m is {self.gybe_room_m}; it must be 0 m or more")
 
+    @property
+    def tacks(self) -> bool:
+        """Whether she turns through the wind under sail; a boat that does not sail has no no-go zone."""
+        return self.can_tack and self.no_go_half_rad > 0.0
+
     def made_good_rad(self, twa_rad: float, tws_mps: float) -> float:
         """Return the angle to the wind of a course through the water, with the bow at ``twa_rad`` [rad, 0..π]."""
         if self.leeway_rad == 0.0:

@@ -372,7 +372,7 @@ def _forget_shoal(ctx: StepContext, order: Order) -> Answer:
 
 def _say_why(ctx: StepContext, _: Order) -> Answer:
     state = ctx.state
-    comes = next_tack(ctx, ctx.voyage.boat) if ctx.config.sails else None
+    comes = next_tack(ctx, ctx.voyage.boat)
     tack = "" if comes is None else f"; next tack in {comes.words}"
     order = state.orders.standing
     under = "" if order is None else f"; {order.words} for {order.age_s(ctx.t_s) / 60.0:.0f} min, {order.why}"

@@ -89,6 +89,7 @@ def next_tack_s(seen: Seen, boat: Boat) -> float | None:
 def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
     """Return the next tack, planned or the autopilot's own; None: there is none, no way on, she is held, or by field.
 
+    Nor has a boat one that does not get through the wind, or that goes under motor: she turns as she likes.
     On a leg inside its no-go zone the autopilot beats: it keeps the tack that it comes on until the edge of its
     corridor, or until the other tack fetches the waypoint; in GUIDED it does not beat, and such a leg is planned anew.
     The end of a mission, a loiter, is no course. Legs ahead are sailed at what the boat has shown of the polar's speed,
@@ -100,6 +101,8 @@ def next_tack(seen: Seen, boat: Boat) -> NextTack | None:
     tws_mps = wind.mean_tws_mps if wind.present_tws_mps is None else wind.present_tws_mps
     if (
         route is None
+        or not boat.tacks
+        or seen.state.adrift.motor
         or seen.is_off_plan
         or seen.state.phase is Phase.HOLDING
         or (status is not None and status.mode not in FOLLOWS)

@@ -394,6 +394,8 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
         speed_mps=2.0,
         tacking=NO_TACKS,
         velocity=(1.7, 1.0),
+        boat=boat,
+        motor=False,
     ):
         route = Route(
             items=(MissionItem(command=Command.NAV_WAYPOINT),) * len(points)
@@ -426,6 +428,7 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
             plans=SimpleNamespace(replanned_index=asked),
             pending=SimpleNamespace(plan=pending),
             tacking=tacking,
+            adrift=SimpleNamespace(motor=motor),
         )
         return next_tack(SimpleNamespace(snapshot=snapshot, state=state, is_off_plan=False), boat)
 
@@ -438,6 +441,9 @@ def test_a_tack_that_a_new_plan_may_move_is_told_as_about():
     failing = replace(NO_TACKS, tried=8, failed=1)
     assert not told(east, (0.0, 100.0), asked=0, tacking=failing).is_planned
     assert told(east, on, heading_deg=-30.0) == pytest.approx((1.0, True), abs=0.1)  # she is turning to this leg
+    for gybes in (replace(boat, can_tack=False), replace(boat, no_go_half_rad=0.0, has_motor=True)):
+        assert told(east, (0.0, 100.0), boat=gybes) is None  # she cannot tack, or does not sail
+    assert told(east, (0.0, 100.0), motor=True) is None
     assert not told(east, on, heading_deg=-30.0, speed_mps=0.5).is_planned  # and may not come through the wind
     assert not told(east, on, heading_deg=-30.0, tacking=replace(NO_TACKS, is_counted=True)).is_planned
     # closed by two degrees, a leg is fetched by the close-hauled course; from a closed leg dead to windward she tacks
