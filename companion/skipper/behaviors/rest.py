@@ -11,7 +11,7 @@ import math
 
 from companion.frozen import changed
 from companion.messages import Mode, Severity
-from companion.safety import BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
+from companion.safety import BY_NAME, BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import begin_station, keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
@@ -94,14 +94,13 @@ def _moved_to_room(ctx: StepContext, bound: Diversion) -> None:
 
 def _how_long(ctx: StepContext) -> str:
     """Return how long a diversion that nobody ordered keeps the boat."""
-    until = next(
-        (
-            ENDINGS[name].until
-            for name in BY_RANK
-            if ENDINGS[name].until and ctx.is_raised(name) and ctx.config.ends.end(name) is not End.SAY
-        ),
-        "",
-    )
+    raised = {r.name: r for r in ctx.state.alarms.raised}
+    name = next((n for n in BY_RANK if ENDINGS[n].until and n in raised and ctx.config.ends.end(n) is not End.SAY), "")
+    since_s = raised[name].clear_since_s if name else None
+    if since_s is not None:  # what she waits for has come, and may not stay
+        over_s = ctx.t_s - since_s
+        return f"{max(0.0, BY_NAME[name].exit_s - over_s):.0f} s more: over for {over_s:.0f} s, and may come back"
+    until = ENDINGS[name].until if name else ""
     return until or ANSWERED.get(ctx.state.operator.answering, TAKEN)
 
 

@@ -67,7 +67,10 @@ def test_under_way_too_much_wind_leads_where_the_mission_says_and_on_when_it_is_
         return
     assert world.run(500, lambda w: "; waiting until less wind is forecast" in w.state.why)
     assert distance_m(world.position, where or here) < (30.0 if where else 400.0)
+    world.wind = lambda t: (0.0, 2.0)
+    assert world.run(120, lambda w: "; waiting 120 s more: over for 0 s, and may come back" in w.state.why)
     world.wind = lambda t: (0.0, 5.0)
+    assert not world.run(110, lambda w: "until less wind is forecast" in w.state.why)  # it is, for a while
     assert world.run(1200, is_done)
     assert world.state.voyage.arrived
 
