@@ -287,17 +287,26 @@ def _motion(ctx: StepContext) -> str:
     return f"making {vehicle.speed_mps:.2g} m/s towards {direction(heading_of(*vehicle.velocity_en_mps))}°"
 
 
+def _makes_way(ctx: StepContext) -> bool:
+    """Return whether she sails in a wind to steer by: round in a loiter, too, where her mean velocity is nothing."""
+    wind, vehicle = ctx.wind_now, ctx.snapshot.vehicle
+    has_wind = wind is not None and wind[1] >= STEERAGE_MPS
+    return has_wind and vehicle is not None and vehicle.speed_mps >= SAILS_MPS
+
+
 def _loiters(ctx: StepContext, ahead: DriftAhead | None) -> bool:
     """Keep LOITER, or ask for it where it drifts; a person who sets AUTO meanwhile is let have it."""
     status, state, memory = ctx.autopilot, ctx.state, ctx.state.adrift
     if status is None or not ctx.snapshot.permissions.may_set_mode:
         return False
-    what = "becalmed" if ctx.is_raised("becalmed") else "adrift"
+    what, until = "becalmed" if ctx.is_raised("becalmed") else "adrift", "she can sail"
+    if ahead is None and _makes_way(ctx):
+        what, until = "out of the calm", "the wind has lasted"
     how = _motion(ctx) if ahead is None else ahead.sentence()
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         place = memory.loiter_en_m if memory.loiter_en_m is not None else ctx.reckoned_en
         ctx.set(adrift=replace(memory, loitered=True, loiter_en_m=place))
-        ctx.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until she can sail")
+        ctx.phase(Phase.HOLDING, f"{what}, {how}: waiting in a loiter until {until}")
         return True
     if status.mode not in {Mode.AUTO, ctx.sails_in} or memory.loitered or ahead is None:
         return False

@@ -103,6 +103,16 @@ def test_in_a_loiter_she_lies_still_only_where_she_does(speed_mps, how):
     assert ctx.state.why.startswith(f"becalmed, {how}")
 
 
+def test_in_a_loiter_who_makes_way_again_is_not_becalmed():
+    """ "becalmed, making 3.1 m/s" was said for as long as the watchdog waits for the wind to last."""
+    still = {"ground_en_mps": (0.0, 0.0), "ground_t_s": NOW_S, "loitered": True}
+    ctx = moment(speed_mps=3.1, up=("becalmed",), adrift=still, steering={"own_mode": Mode.LOITER})
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mode=Mode.LOITER))
+    assert stops_drift(ctx)
+    told = "out of the calm, making 3.1 m/s towards 090°: waiting in a loiter until the wind has lasted"
+    assert ctx.state.why == told
+
+
 def test_over_the_missions_own_fence_the_call_for_the_anchor_goes_on():
     """It may be the shore: she was told 386 m clear of everything, and the calls ended, while she lay over it."""
     w = world(obstacles=(), voyage={"limits": box(-60.0, -60.0, 40.0, 600.0)})
