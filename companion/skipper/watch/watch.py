@@ -309,6 +309,8 @@ def _patience_s(ctx: StepContext, dog: Watchdog) -> float:
 
 
 def _done_about(ctx: StepContext, dog: Watchdog) -> str:
+    if ctx.is_given_up:
+        return Response.SAY.value
     if dog.response is Response.REPLAN and ctx.is_field_steered and dog.name == "no progress":
         return "a plan is asked for, to be sailed in AUTO" if may_fall_back(ctx) else "steered on by field"
     return words(ctx.config, dog.name) if dog.response is Response.AS_SET else dog.response.value

@@ -293,9 +293,11 @@ def test_while_stop_stands_her_number_is_that_which_the_autopilot_sails_for():
     answer(world, "stop")
     last = len(world.state.mission.route.items) - 1
     assert world.run(600, lambda w: w.seq == last + 1)
-    world.run(5)
+    world.run(8)
     assert world.state.phase is Phase.OPERATOR
     assert world.state.mission.index == last
+    ended = [a.text for _, a in world.actions if isinstance(a, act.Announce) and a.code == "mission ended"]
+    assert ended == ["mission ended"]  # "plan again from the boat" was said, and nothing is asked of her
 
 
 def test_a_refuge_without_room_for_a_loiter_is_told_with_how_far_off_she_lies():
