@@ -64,6 +64,8 @@ def find_trigger(ctx: StepContext, fresh: tuple[str, ...]) -> Trigger | None:
     bound, route = diversion(ctx), ctx.state.mission.route
     if state.voyage.over if bound is None else not bound.has_place:
         return None
+    if state.operator.is_back and state.plans.asked and state.plans.asked_as is ReplanReason.ORDER:
+        return Trigger(reason=state.plans.asked_as, text=state.plans.asked)
     if state.operator.is_back:
         cause = state.operator.answering
         text = f"stopped by the {cause} failsafe" if cause else "taken up again from where she is"

@@ -72,11 +72,14 @@ def test_a_plan_that_nobody_ordered_is_told_by_its_own_reason(kind):
 
 
 def test_a_boat_that_was_given_back_plans_before_all_else_and_says_by_whom():
-    by_person = find_trigger(moment(DEEP, operator={"is_back": True}, plans={"asked": "ordered"}), ())
+    failed = {"asked": "a tack failed", "asked_as": ReplanReason.TACK_FAILED}
+    by_person = find_trigger(moment(DEEP, operator={"is_back": True}, plans=failed), ())
     by_failsafe = find_trigger(moment(DEEP, operator={"is_back": True, "answering": "radio"}), ())
     assert (by_person.reason, by_person.text) == (ReplanReason.OPERATOR_BACK, "taken up again from where she is")
     assert (by_person.interval_s, by_person.urgent, by_person.from_index) == (0.0, False, None)
     assert by_failsafe.text == "stopped by the radio failsafe"
+    ordered = find_trigger(moment(DEEP, operator={"is_back": True}, plans={"asked": "A is given up"}), ())
+    assert (ordered.reason, ordered.text) == (ReplanReason.ORDER, "A is given up")  # "planning: operator back" was said
 
 
 @pytest.mark.parametrize(("record_s", "is_planned"), [(29.9, False), (30.0, True)])
