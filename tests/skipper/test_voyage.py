@@ -513,6 +513,7 @@ def test_a_mission_that_the_operator_brought_is_his():
     assert world.state.phase is Phase.OPERATOR
     assert "not ours" in world.state.why
     world.order("replace")
+    assert world.run(30, lambda w: w.state.why == "making a new plan")  # "making the first plan" was said
     assert world.run(1500, is_done)
 
 

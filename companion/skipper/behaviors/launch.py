@@ -33,17 +33,17 @@ def start(ctx: StepContext) -> None:
     """Get a first plan on board."""
     state, snapshot = ctx.state, ctx.snapshot
     if state.pending.upload is not None:
-        ctx.phase(Phase.WAITING, "waiting for the first plan's upload")
+        ctx.phase(Phase.WAITING, f"waiting for {_which(ctx)}'s upload")
         return
     if state.pending.plan is not None:
-        ctx.phase(Phase.NEW_CALCULATION, "making the first plan")
+        ctx.phase(Phase.NEW_CALCULATION, f"making {_which(ctx)}")
         return
     if state.plans.ready_route is not None and ctx.t_s - state.plans.ready_route.plan_t_s < 60.0:
         ctx.phase(
             Phase.WAITING, f"a plan is ready; waiting for permission to upload it: {snapshot.permissions.to_upload}"
         )
         if snapshot.permissions.may_upload:
-            upload(ctx, state.plans.ready_route, 1, "the first plan")
+            upload(ctx, state.plans.ready_route, 1, _which(ctx))
         return
     shut = next(filter(None, (fenced_off(ctx, gate) for gate in ctx.gates[ctx.state.progress.gate :])), "")
     if shut:
@@ -75,9 +75,14 @@ def start(ctx: StepContext) -> None:
         ctx.phase(Phase.WAITING, "waiting for " + ", ".join(wants))
         return
     if _request_start(ctx):
-        ctx.phase(Phase.NEW_CALCULATION, "making the first plan")
+        ctx.phase(Phase.NEW_CALCULATION, f"making {_which(ctx)}")
     else:
         ctx.phase(Phase.WAITING, f"waiting for {lacks(ctx) or 'the next try: no problem can be stated'}")
+
+
+def _which(ctx: StepContext) -> str:
+    """Return what the plan that is made is called: in place of a mission that somebody brought it is not the first."""
+    return "a new plan" if ctx.state.voyage.under_way_s > 0.0 else "the first plan"
 
 
 def _far_off(ctx: StepContext) -> str:
