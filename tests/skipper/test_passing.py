@@ -17,7 +17,7 @@ from companion.skipper.planning.answers import take_plan
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.planning.track import steps
-from companion.skipper.step.actions import Announce, ReplanReason, UploadMission
+from companion.skipper.step.actions import Acknowledge, Announce, ReplanReason, UploadMission
 from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
@@ -426,7 +426,10 @@ def test_in_a_box_without_a_time_she_stays_until_told():
     w.order("hold")
     w.run(5.0)
     w.order("go_on")  # the end of the hold, not of the stay
-    w.run(20.0)
+    w.run(1.0)
+    told = [a.text for _, a in w.actions if isinstance(a, Acknowledge)][-1]
+    assert told == "the end of hold: she stays in box until told to go on"  # "on to box" was said
+    w.run(19.0)
     assert w.state.progress.reached == ()
     w.order("go_on")
     w.run(3.0)

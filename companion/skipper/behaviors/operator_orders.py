@@ -7,8 +7,11 @@ answer may have been lost: it gets the same answer, and nothing is done twice.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
+
+import shapely
 
 from companion.frozen import changed
 from companion.messages import Mode, Severity
@@ -32,6 +35,7 @@ from companion.skipper.planning.diversions import (
 )
 from companion.skipper.planning.next_tack import next_tack
 from companion.skipper.planning.not_found import hold
+from companion.skipper.planning.waits import stay_left_s
 from companion.skipper.step.actions import Acknowledge, ReplanReason, RequestPlan, StopOrders
 from companion.skipper.step.config import Learning
 from companion.skipper.step.context import StepContext
@@ -221,7 +225,20 @@ def _go_on(ctx: StepContext, _: Order) -> Answer:
             operator=changed(ctx.state.operator, is_back=True),
         )
         ctx.phase(Phase.WAITING, "to go on: waiting for the mission on board to be compared")
-    return _done(f"the end of {was.words}: {_next(ctx)}")
+    return _done(f"the end of {was.words}: {_going_on(ctx)}")
+
+
+def _going_on(ctx: StepContext) -> str:
+    """Return what is next when an order ends: where she is in a box, or was sailed by a field, that goes on."""
+    gate, boat, inside = ctx.gate, ctx.boat_en, ctx.state.progress.inside
+    if gate is None or boat is None or inside is None or inside.goal != gate.goal or ctx.state.voyage.over:
+        return _next(ctx)
+    if gate.field is not None:
+        return f"on with the field of {gate.name}"
+    if gate.box is None or not shapely.contains_xy(gate.box.area_en, *boat):
+        return _next(ctx)
+    left_s = stay_left_s(ctx, gate)
+    return f"she stays in {gate.name} {UNTIL_TOLD if math.isinf(left_s) else f'for {left_s:.0f} s more'}"
 
 
 def _next(ctx: StepContext) -> str:
