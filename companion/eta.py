@@ -21,7 +21,7 @@ from companion.messages import Command, Mode
 from companion.safety import LIGHT_MPS, SAILS_MPS
 from companion.skipper import SkipperState, Voyage
 from companion.skipper.planning import FOLLOWS
-from companion.skipper.step import Phase, Snapshot, SpeedSeen, WindEstimate
+from companion.skipper.step import Phase, Route, Snapshot, SpeedSeen, WindEstimate
 from companion.skipper.way import PointEn, cross_track_m, gates_of, moved
 
 Winds = tuple[tuple[float, float], ...]  # from [rad] and speed [m/s], for WIND_S each
@@ -213,9 +213,21 @@ def _is_becalmed(snapshot: Snapshot, state: SkipperState) -> bool:
 
 
 def _is_leaving(state: SkipperState) -> bool:
-    """Return whether the boat is held, or ordered elsewhere, and the way on board is still the one to the goals."""
-    route, order = state.mission.route, state.orders.standing
-    return state.phase is Phase.HOLDING or (order is not None and route is not None and not route.bound_for)
+    """Return whether the boat is held, or bound elsewhere than the way on board leads: another is made or uploaded."""
+    route, order, plan, upload = state.mission.route, state.orders.standing, state.pending.plan, state.pending.upload
+    if state.phase is Phase.HOLDING or route is None:
+        return True
+    if order is not None and not route.bound_for:
+        return True
+    on_board = _bound_for(route, state.mission.index)
+    if upload is not None:
+        return _bound_for(upload.route, state.mission.index) != on_board
+    return plan is not None and plan.from_index is None and plan.facts.bound_for != on_board
+
+
+def _bound_for(route: Route, index: int) -> str:
+    """Return where what is left from an item on leads in the first place: empty: to a goal."""
+    return "" if route.is_for_goals(index) else route.bound_for
 
 
 def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -> Pace:

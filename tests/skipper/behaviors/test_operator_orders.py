@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 from shapely.geometry import box
 
+from companion.eta import PRIOR_PACE, eta_of
 from companion.messages import Mode
 from companion.orders import Result, Verb
 from companion.skipper.step import actions as act
@@ -266,6 +267,33 @@ def test_a_refuge_unknown_is_refused_with_those_there_are():
     given = answer(world, "refuge Nowhere")
     assert given.result is Result.REFUSED
     assert given.text == "the mission has no such refuge: it has 1 1, 2 2"
+
+
+def test_told_to_go_on_before_a_refuge_no_time_to_it_is_told_any_more():
+    """ "there in 0 s" stood beside "to A" while the plan to A was made and uploaded."""
+    world = sailing(refuges=REFUGES)
+    answer(world, "refuge")
+    bound = "the refuge 1"
+    assert world.run(
+        400, lambda w: w.state.mission.route.bound_for == bound and distance_m(w.position, REFUGES[0]) < 25
+    )
+    assert eta_s(world) == pytest.approx(5.0, abs=4.0)
+    world.plan_s = world.upload_s = 3.0
+    assert answer(world, "go_on").text == "the end of refuge 1: on to A"
+    told = []
+    while world.state.mission.route.bound_for == bound and len(told) < 60:
+        told.append(eta_s(world))
+        world.step()
+    assert 5 < len(told) < 60
+    assert set(told) == {None}
+
+
+def eta_s(world):
+    """Return when she is told to be there; what is on its way to the skipper stays so."""
+    pending, world.pending = world.pending, []
+    eta = eta_of(world.snapshot(), world.state, world.skipper.voyage, PRIOR_PACE)
+    world.pending = pending
+    return eta.there_s
 
 
 # ------------------------------------------------------------------------------------------------ others
