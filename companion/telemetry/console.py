@@ -283,8 +283,7 @@ def progress_text(step: Step) -> str:
         parts.append(f"autopilot silent for {snapshot.heartbeat_age_s:.0f} s: what follows is old")
     under_way = route is not None and state.voyage.sailing and state.phase is not Phase.DONE
     if under_way and step.is_off_plan:
-        left_m = goal_distance_m(step, step.voyage)
-        parts.append("by field" if left_m is None else f"by field, goal {left_m:.0f} m")
+        parts.append(f"by field{_goal_left(step)}")
     elif under_way and route is not None and autopilot is not None:
         distance = on_leg(step).left_m
         at = "" if distance is None else f" {distance:.0f} m"
@@ -321,6 +320,14 @@ def progress_text(step: Step) -> str:
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
         parts.append(state.why)
     return " | ".join(parts)
+
+
+def _goal_left(step: Step) -> str:
+    """Return how far it is to the goal that is next, or to the place that an order has named, in words."""
+    here, order, left_m = step.snapshot.position_en_m, step.state.orders.standing, goal_distance_m(step, step.voyage)
+    if order is not None and order.en_m is not None and here is not None:
+        return f", {math.dist(here, order.en_m):.0f} m to {order.words}"
+    return "" if left_m is None else f", goal {left_m:.0f} m"
 
 
 def _where(step: Step) -> str:

@@ -15,11 +15,13 @@ from companion.commands.report import clearance_line
 from companion.field.guidance import LastResort
 from companion.fold import Step
 from companion.messages import CompanionStatus, Mode, Severity
+from companion.orders import Verb
 from companion.skipper import Skipper
 from companion.skipper.planning import next_tack
 from companion.skipper.step import Phase, is_off_plan
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import Guidance, SkipperConfig
+from companion.skipper.step.saved import Standing
 from companion.telemetry.console import ProgressLine, left_behind, progress_text
 from companion.telemetry.folder.records import VoyageFigures
 from companion.telemetry.status import companion_status
@@ -199,6 +201,9 @@ def test_by_field_nothing_is_told_of_the_plan_on_board(guidance):
     line, status, view = told["field"]
     assert not [w for w in (*words, "next tack") if w in line]
     assert re.search(r"by field, goal (\d+) m", line)[1] == f"{status.goal_distance_m:.0f}"
+    place = Standing(verb=Verb.GOAL, by="the ground station", name="51.10200 -1.30000", en_m=(0.0, 1000.0), since_s=0.0)
+    ordered = progress_text(replace(by_field, state=with_parts(state, orders={"standing": place})))
+    assert f"by field, {math.dist(snapshot.position_en_m, place.en_m):.0f} m to goal 51.10200 -1.30000 |" in ordered
     assert status.plan_id is not None  # it is on board
     radio = (status.waypoint_distance_m, status.cross_track_m, status.next_tack_s, status.promised_risk)
     shown = (view.plan.there_s, view.plan.there_late_s, view.plan.expected_clearance_m, view.plan.path_risk)

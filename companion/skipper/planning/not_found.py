@@ -174,10 +174,11 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         ctx.say(Severity.WARNING, TIDE, f"no way before the tide is higher ({reason}): waiting; {opens.words}")
         hold(ctx, opens.words)
         return
+    stays = "steered on by field" if ctx.is_by_field else "holding"
     ctx.say(
         Severity.CRITICAL,
         "no plan at all",
-        f"no plan, whatever is given up for one ({reason}): holding, trying again in {wait:.0f} s",
+        f"no plan, whatever is given up for one ({reason}): {stays}, trying again in {wait:.0f} s",
         every_s=0.0,
     )
     hold(ctx, f"no plan found: {reason}")

@@ -26,7 +26,7 @@ from companion.skipper.planning.not_found import not_found
 from companion.skipper.planning.track import steps
 from companion.skipper.planning.uploads import _below_floor, clearance_here_m, judged
 from companion.skipper.step.actions import Announce, ReplanReason, RequestPlan, SetCurrent, UploadMission
-from companion.skipper.step.config import Ends
+from companion.skipper.step.config import Ends, Guidance
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Retry
@@ -378,6 +378,20 @@ def test_a_sound_way_that_leads_elsewhere_than_she_is_bound_for_is_kept_at_the_l
     assert ("the old one is sound and stays" in says) is stays
     assert any(isinstance(a, RequestPlan) for a in ctx.actions) is not stays
     assert not uploads(ctx.actions)
+
+
+@pytest.mark.parametrize(
+    ("mode", "goes_on"), [(Mode.GUIDED, "steered on by field, trying"), (Mode.AUTO, "holding, trying")]
+)
+def test_where_no_plan_is_found_by_field_she_is_steered_on_and_not_held(mode, goes_on):
+    way, wall = route((0.0, 100.0), (0.0, 200.0), (0.0, 200.0)), shapely.box(-50.0, 140.0, 50.0, 160.0)
+    ctx = moment(way, obstacles=(wall,), heading_deg=0.0, twd_deg=90.0, config={"guidance": Guidance.FIELD})
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mode=mode))
+    assert request(ctx, ReplanReason.NO_PROGRESS, rung=len(steps(ctx)) - 1)
+    ctx.actions.clear()
+    not_found(ctx, ctx.state.pending.plan, "none")
+    [says] = [a.text for a in ctx.actions if isinstance(a, Announce)]
+    assert f"whatever is given up for one (none): {goes_on}" in says
 
 
 @pytest.mark.parametrize(("count", "failures", "stays"), [(1, 0, False), (2, 0, True), (2, 1, False)])
