@@ -283,8 +283,7 @@ def _aim(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) ->
     if gate >= 0 or aim.en_m != target.en_m:
         return aim
     # Home is where she was armed, by a quay: the plan ends as near to it as it may.
-    whole = replace(aim, radius_m=target.radius_m)
-    return aim_near(ctx.to_stay_in.area, ctx.config, whole, step.margin_m) or aim
+    return aim_near(ctx.to_stay_in.area, ctx.config, target.en_m, target.radius_m, step.margin_m) or aim
 
 
 def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:

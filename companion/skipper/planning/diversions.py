@@ -13,7 +13,7 @@ from companion.boat import Boat
 from companion.messages import Severity
 from companion.orders import Verb
 from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
-from companion.skipper.planning.statement import Aim, aim_near
+from companion.skipper.planning.statement import aim_near
 from companion.skipper.planning.track import steps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
@@ -451,7 +451,7 @@ def place_trouble(ctx: StepContext, what: str, en_m: PointEn, radius_m: float) -
     if clearance >= ctx.config.margin_m:
         return ""
     least_m = steps(ctx)[-1].margin_m
-    if aim_near(area, ctx.config, Aim(en_m=en_m, radius_m=radius_m, gate=-1), least_m) is not None:
+    if aim_near(area, ctx.config, en_m, radius_m, least_m) is not None:
         return ""
     off = below_words(clearance, least_m)
     return f"{what} is {off} m from {area.nearest_name(en_m)}: no plan leads nearer than {least_m:g} m"

@@ -63,7 +63,7 @@ LEG_SAVING = 8e-5  # share of a plan's time that a leg must save: each is an ite
 HAIR_M = 0.2  # a repaired point stands this far clear of the margin it was repaired for
 PIECE_M = 2000.0  # a geodesic is off a chord of this length by 8 cm at most, at 75 degrees of latitude too
 MOST_LEVEL = 0.9999  # of an interval: beyond it no normal distribution tells
-NEAR_SHARES, NEAR_COUNT = (0.0, 0.2, 0.4, 0.6, 0.8), 24  # of an aim's radius, and how many places all round
+NEAR_SHARES, NEAR_COUNT = (0.2, 0.4, 0.6, 0.8), 24  # of an aim's radius, and how many places all round
 _EARTH = Geod(ellps="WGS84")
 
 
@@ -281,11 +281,13 @@ def _inner_m(config: SkipperConfig, radius_m: float) -> float:
     return max(radius_m - config.announce_m, 0.2 * radius_m)
 
 
-def aim_near(area: AreaLike, config: SkipperConfig, place: Aim, margin_m: float) -> Aim | None:
-    """Return an aim within one to a place that completes nothing, the nearest that keeps a margin; None: none does."""
-    inner_m = _inner_m(config, place.radius_m)
+def aim_near(area: AreaLike, config: SkipperConfig, en_m: PointEn, radius_m: float, margin_m: float) -> Aim | None:
+    """Return an aim within ``radius_m`` of a place that completes nothing, the nearest that keeps a margin, or None."""
+    inner_m = _inner_m(config, radius_m)
+    if float(area.clearance_m([en_m])[0]) >= margin_m:
+        return Aim(en_m=en_m, radius_m=inner_m, gate=-1)
     for share in NEAR_SHARES:
-        ring = [moved(place.en_m, 2.0 * math.pi * n / NEAR_COUNT, share * inner_m) for n in range(NEAR_COUNT)]
+        ring = [moved(en_m, 2.0 * math.pi * n / NEAR_COUNT, share * inner_m) for n in range(NEAR_COUNT)]
         rooms_m = area.clearance_m(ring)
         best = int(np.argmax(rooms_m))
         if rooms_m[best] >= margin_m:
