@@ -353,23 +353,13 @@ def _plan(ctx: StepContext) -> None:
 
 
 # ------------------------------------------------------------------------------------------ station
-def begin_station(ctx: StepContext, place: PointEn, until: str) -> None:
-    """Say that the boat stays at the last goal, which is for as long as the mission asks from the first time on."""
-    boat, voyage = ctx.boat_en, ctx.state.voyage
-    if voyage.station_since_s is None:
-        ctx.set(voyage=changed(voyage, station_since_s=ctx.t_s))
-    off = "" if boat is None else f", {distance_m(boat, place):.0f} m off"
-    ctx.phase(Doing.HOLDING, f"keeping station: waiting {until}{off}")
-
-
-def keeps_station(ctx: StepContext, place: PointEn, until: str) -> bool:
+def keeps_station(ctx: StepContext, place: PointEn) -> bool:
     """Stay at a place by field; False where that is not the guidance: the loiter that ends the mission does it.
 
     A motorboat lies still in that, too.
     """
     if not ctx.is_field_steered or not ctx.config.sails:
         return False
-    begin_station(ctx, place, until)
     status, seen = ctx.autopilot, situation(ctx)
     if status is not None and status.mode is not Mode.GUIDED:
         set_mode(ctx, Mode.GUIDED, "keeping station by field")

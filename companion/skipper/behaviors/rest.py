@@ -13,7 +13,7 @@ from companion.frozen import changed
 from companion.messages import Mode, Severity
 from companion.safety import BY_NAME, BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
 from companion.skipper.behaviors.failsafe import waits_for
-from companion.skipper.behaviors.field_guidance import begin_station, keeps_station
+from companion.skipper.behaviors.field_guidance import keeps_station
 from companion.skipper.behaviors.helm import hand_back, repair
 from companion.skipper.planning.diversions import (
     HOME,
@@ -43,7 +43,8 @@ UNTIL_TOLD = "until told to go on"
 def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     """Lie at the end of a diversion; True while the boat does."""
     is_station = bound.kind is DiversionKind.STATION
-    if is_station and station_left_s(ctx) > 0.0 and keeps_station(ctx, bound.en_m, bound.until):
+    if is_station and station_left_s(ctx) > 0.0 and keeps_station(ctx, bound.en_m):
+        _begin_station(ctx, bound)
         return True
     if not is_at_rest(ctx) or is_shut_off(ctx) or ctx.state.steering.own_mode in STOPPING:
         return False
@@ -67,12 +68,21 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
         return True
     hand_back(ctx)
     if is_station:
-        begin_station(ctx, bound.en_m, bound.until)
+        _begin_station(ctx, bound)
         return True
     where = "staying near by" if bound.kind is DiversionKind.STAY else _at(ctx, bound)
     how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
     ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
     return True
+
+
+def _begin_station(ctx: StepContext, bound: Diversion) -> None:
+    """Say that the boat stays at the last goal, which is for as long as the mission asks from the first time on."""
+    boat, voyage = ctx.boat_en, ctx.state.voyage
+    if voyage.station_since_s is None:
+        ctx.set(voyage=changed(voyage, station_since_s=ctx.t_s))
+    off = "" if boat is None else f", {distance_m(boat, bound.en_m):.0f} m off"
+    ctx.phase(Phase.HOLDING, f"keeping station: waiting {bound.until}{off}")
 
 
 def _at(ctx: StepContext, bound: Diversion) -> str:
