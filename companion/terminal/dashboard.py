@@ -15,7 +15,7 @@ from companion.geo.angles import direction, wrap_pi, wrap_two_pi
 from companion.terminal.keys import KEYS, KeyCommands, shown
 from companion.terminal.screen import Frame, Style
 from companion.view import Event, FigureView, View, WindView
-from companion.words import counted, one_line
+from companion.words import brief_time, counted, one_line
 
 OLD_S = 10.0  # what was heard longer ago looks old
 
@@ -64,17 +64,8 @@ def side_text(angle_deg: float | None) -> str:
 
 
 def span_text(seconds: float | None) -> str:
-    """Return a time span.
-
-    >>> span_text(42.0), span_text(100.0), span_text(5000.0)
-    ('42 s', '1:40', '1 h 23')
-    """
-    if seconds is None:
-        return "-"
-    whole = int(max(0.0, seconds))
-    if whole < 60:
-        return f"{whole} s"
-    return f"{whole // 60}:{whole % 60:02d}" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02d}"
+    """Return a time span."""
+    return "-" if seconds is None else brief_time(seconds)
 
 
 def length_text(value_m: float | None) -> str:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from companion.plots.chart import save, scale_bar
 from companion.plots.drying import draw_drying, drying_picture
 from companion.plots.mission import draw_area, draw_marks, extent_of
-from companion.words import counted
+from companion.words import brief_time, counted
 from sitl.rehearse.changes import Tried, scaled
 from sitl.rehearse.estimates import Estimates, lasting, percent
 from sitl.rehearse.prepared import PreparedRehearsal
@@ -162,17 +162,6 @@ def _chances(axes: Axes, known: Estimates) -> None:
     axes.grid(visible=True, axis="x", alpha=0.3)
 
 
-def clock(seconds: float) -> str:
-    """Return a time for a tick of an axis, which has no room for words.
-
-    >>> clock(75.0), clock(7300.0)
-    ('1:15', '2:01:40')
-    """
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
-
-
 def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
     times = sorted(record["time_s"] for record in known.records if record.get("arrived"))
     if times:
@@ -192,11 +181,11 @@ def _times(axes: Axes, known: Estimates, planned_s: float) -> None:
     axes.set(
         ylim=(0.0, 1.02),
         xlim=(0.9 * low_s, None),
-        xlabel="time since setting sail, [h:]min:s",
+        xlabel="time since setting sail, min:s or h min",
         ylabel="share that is there",
         title="Times, with three quantiles and what is 95 % sure of them",
     )
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda time_s, _: clock(time_s)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda time_s, _: brief_time(time_s)))
     axes.grid(visible=True, alpha=0.3)
 
 
