@@ -17,6 +17,7 @@ from companion.skipper.behaviors.drifting import follow_ground
 from companion.skipper.behaviors.failsafe import begin_again, follow_answer, follow_stops
 from companion.skipper.behaviors.fallback import follow_fallback
 from companion.skipper.behaviors.field_guidance import follow_field
+from companion.skipper.behaviors.launch import leave_start
 from companion.skipper.behaviors.operator_orders import preview, take_orders
 from companion.skipper.behaviors.position_doubt import follow
 from companion.skipper.behaviors.shoaling import follow_soundings
@@ -174,6 +175,7 @@ def observe(ctx: StepContext) -> None:
     follow_ground(ctx)
     follow_field(ctx)
     locate(ctx)
+    leave_start(ctx)
     look_out(ctx)
     count_time(ctx)
     follow_charge(ctx)

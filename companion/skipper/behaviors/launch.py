@@ -278,6 +278,29 @@ def _tell_clearance(ctx: StepContext) -> None:
     here, leg, route = drifted_en(ctx, GATHERS_WAY_S), ctx.leg(), ctx.state.mission.route
     if here is None or leg is None or route is None or route.expected_clearance_m is None:
         return
-    seen_m = _way_m(water_to_keep(ctx.voyage.area, here), here, leg[1]) - ctx.voyage.boat.hull.reach_m
-    if seen_m < route.expected_clearance_m:
-        ctx.set(mission=changed(ctx.state.mission, route=replace(route, expected_clearance_m=seen_m)))
+    seen_m, told_m = _hull_clear_m(ctx, here, leg[1]), route.expected_clearance_m
+    if seen_m < told_m:
+        route = replace(route, expected_clearance_m=seen_m, planned_clearance_m=told_m)
+        ctx.set(mission=changed(ctx.state.mission, route=route))
+
+
+def leave_start(ctx: StepContext) -> None:
+    """Let the clearance that is told be the plan's again, once the way to her next waypoint has as much."""
+    here, leg, route = ctx.boat_en, ctx.leg(), ctx.state.mission.route
+    if (
+        route is None
+        or route.planned_clearance_m is None
+        or here is None
+        or leg is None
+        or not ctx.state.voyage.sailing
+    ):
+        return
+    planned_m = route.planned_clearance_m
+    if _hull_clear_m(ctx, here, leg[1]) >= planned_m:
+        route = replace(route, expected_clearance_m=planned_m, planned_clearance_m=None)
+        ctx.set(mission=changed(ctx.state.mission, route=route))
+
+
+def _hull_clear_m(ctx: StepContext, here: PointEn, to: PointEn) -> float:
+    """Return the least clearance of the hull on a straight way [m]."""
+    return _way_m(water_to_keep(ctx.voyage.area, here), here, to) - ctx.voyage.boat.hull.reach_m

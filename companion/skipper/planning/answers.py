@@ -255,6 +255,7 @@ def _keep_old(ctx: StepContext, pending: PendingPlan, plan: Plan) -> bool:
         gate_of=route.gate_of,
         plan_id=route.plan_id,
         expected_clearance_m=route.expected_clearance_m,
+        planned_clearance_m=route.planned_clearance_m,
         why=route.why,
         risk=told.total,
         vessel_risk=told.vessels.total,

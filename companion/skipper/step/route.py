@@ -38,6 +38,9 @@ class Route:
     vessel_risk: float = 0.0  # the vessels' part of it
     vessels_part: float = 0.0  # of 1 - delta_s, at each instant, the vessels' part
     expected_clearance_m: float | None = None  # of the hull on the predicted track, the prediction's error taken off
+    planned_clearance_m: float | None = (
+        None  # that of the plan, where the way from her start has less, until it is left
+    )
     cost_s: float | None = None
     median_s: float | None = None  # when half the winds of the forecast's spread are there ...
     late_s: float | None = None  # ... and nine of ten; None: not told, or not in any time
@@ -83,6 +86,7 @@ class Route:
             risk=None,
             vessel_risk=0.0,
             expected_clearance_m=None,
+            planned_clearance_m=None,
             cost_s=None,
             median_s=None,
             late_s=None,

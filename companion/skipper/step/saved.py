@@ -38,7 +38,7 @@ _NUMBERS = (
     "plan_current_east_mps",
     "plan_current_north_mps",
 )
-_MAYBE = ("risk", "cost_s", "median_s", "late_s", "expected_clearance_m")
+_MAYBE = ("risk", "cost_s", "median_s", "late_s", "expected_clearance_m", "planned_clearance_m")
 _WORDS = ("rung", "why", "bound_for")
 # of states that were saved before there were any
 _DEFAULTS: dict[str, Any] = {
@@ -48,6 +48,7 @@ _DEFAULTS: dict[str, Any] = {
     "plan_current_north_mps": 0.0,
     "bound_for": "",
     "expected_clearance_m": None,
+    "planned_clearance_m": None,
     "median_s": None,
     "late_s": None,
 }

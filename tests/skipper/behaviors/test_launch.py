@@ -9,6 +9,7 @@ from shapely.geometry import box
 from companion.messages import Mode, StatusText
 from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, Permissions
+from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
 from companion.skipper.way.voyage import Goal
 from tests.skipper.world import World, skipper, voyage
@@ -123,6 +124,27 @@ def test_the_clearance_told_at_setting_sail_is_that_of_the_way_from_where_she_is
     came_m = world.skipper.voyage.area.path_clearance_m(world.track[begun:]) - world.skipper.voyage.boat.hull.reach_m
     assert told_m < promised_m - 5.0
     assert told_m <= came_m + 0.5
+
+
+def test_once_she_is_clear_of_where_she_drifted_to_the_clearance_told_is_the_plans():
+    """ "clearance expected 0.4 m inside what was drawn or found since" stood on the line for a whole voyage."""
+    world = make(obstacles=(box(-200.0, -60.0, 200.0, -20.0),), position=(0.0, 0.0), permissions=MAY_UPLOAD)
+    assert world.run(60, lambda w: bool(w.mission))
+    promised_m = world.state.mission.route.expected_clearance_m
+    world.current = lambda t: (0.0, -1.2)
+    world.run(6)
+    world.permissions = ALL_PERMITTED
+    assert world.run(60, is_sailing)
+    world.current = lambda t: (0.0, 0.0)
+    route = world.state.mission.route
+    assert route.expected_clearance_m < promised_m - 5.0
+    saved = Persisted.from_dict(world.skipper.persisted(world.state).to_dict())
+    assert saved.lists[0].planned_clearance_m == promised_m
+    assert world.run(60, lambda w: w.state.mission.route.planned_clearance_m is None)
+    assert world.state.mission.route.plan_id == route.plan_id
+    assert world.state.mission.route.expected_clearance_m == promised_m
+    off_m = world.skipper.voyage.area.clearance_m([world.position])[0]
+    assert promised_m <= off_m < promised_m + 8.0
 
 
 def chosen(world, mode):
