@@ -53,10 +53,40 @@ def test_a_wall_is_one_from_its_third_ping_on_whatever_a_deeper_ping_says():
     assert told([*before, *[1.5] * 5, 6.0, 6.0]).status.depth_m == 1.5
 
 
-def test_a_shoal_is_told_and_how_fast_it_comes():
+def test_a_shoal_is_told_where_the_newest_ping_came_and_how_fast_it_comes():
     status = told([10.0 - 0.05 * n for n in range(60)]).status
-    assert status.depth_m == pytest.approx(7.15)
+    assert status.depth_m == pytest.approx(7.05)
     assert status.depth_rate_mps == pytest.approx(-0.1, abs=0.01)
+
+
+def test_over_a_steep_slope_with_echoes_that_are_lost_each_ping_tells_the_depth():
+    """A metre a second: pings so far apart agreed on nothing, and she was told no depth from 4 m until she struck."""
+    assembler = VehicleAssembler()
+    beat(assembler, 0.0)
+    depths = [10.0] * 12 + [10.0 - 0.5 * n for n in range(1, 18)]
+    for n, depth_m in enumerate(depths):
+        if n < 12 or n % 2:
+            assembler.take(0.5 * n, heard(ping(depth_m)))
+            assert n < 4 or assembler.status.depth_m == pytest.approx(depth_m, abs=2.0)
+    assert assembler.status.depth_m == pytest.approx(2.0, abs=0.3)
+    assert assembler.status.depth_rate_mps == pytest.approx(-1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_what_is_no_bottom_does_not_tilt_the_change(count):
+    """Of an echo told at half the depth, three times in six seconds, the bottom is no less deep and no steeper."""
+    pings = [8.0] * 20
+    for n in range(count):
+        pings[-2 - 3 * n] = 4.0
+    status = told(pings).status
+    assert (status.depth_m, status.depth_rate_mps) == (8.0, 0.0)
+
+
+def test_pings_of_one_moment_tell_no_change():
+    assembler = told([6.0])
+    for _ in range(60):
+        assembler.take(5.0, heard(ping(5.0)))
+    assert (assembler.status.depth_m, assembler.status.depth_rate_mps) == (5.0, None)
 
 
 def test_one_ping_is_no_depth_and_one_that_is_silent_is_forgotten():
