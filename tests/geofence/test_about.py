@@ -96,6 +96,19 @@ def test_a_circle_that_is_near_is_drawn_and_one_that_is_far_is_left_out():
     assert within.covers(shapely.points((5000.0, 0.0))) == (apart_m(inside, round_all.center) < 60_000.0)
 
 
+@pytest.mark.parametrize(("lon_deg", "here_deg"), [(-179.99, 179.95), (179.95, -179.99), (179.95, 179.9)])
+def test_a_rock_over_the_date_line_is_near_by_whichever_longitude_it_is_written(lon_deg, here_deg):
+    rock = Polygon([(lon_deg, 51.5), (lon_deg + 0.01, 51.5), (lon_deg, 51.51)])
+    frame = frame_at(51.5, here_deg)
+    [piece] = polygons_about(rock, frame, REACH_M)
+    assert piece.distance(shapely.points(frame.en_from_geo(GeoPoint(lat_deg=51.5, lon_deg=lon_deg)))) < 1e-3
+
+
+def test_an_edge_is_cut_as_finely_as_its_own_latitude_asks_wherever_the_frame_is():
+    far, near = (polygons_about(NORTHERN, frame_at(lat_deg, 20.0), math.inf)[0] for lat_deg in (60.0, 75.0))
+    assert len(far.exterior.coords) == len(near.exterior.coords) > 50
+
+
 @pytest.mark.parametrize("lat_deg", [89.5, -89.5])
 def test_near_a_pole_nothing_near_is_lost(lat_deg):
     frame = frame_at(lat_deg, 0.0)

@@ -64,6 +64,12 @@ def test_a_limit_without_a_margin_of_its_own_is_where_it_is_drawn():
         assert bounds == pytest.approx((-far_m, -far_m, far_m, far_m), abs=0.05 * (50.0 - far_m) + 1e-3)
 
 
+@pytest.mark.parametrize(("own_m", "margin_m"), [(None, 0.0), (30.0, 30.0)])
+def test_an_obstacle_has_a_margin_of_its_own_where_it_says_one(own_m, margin_m):
+    rock = Obstacle(shape=Circle(ORIGIN, 20.0), margin_m=own_m)
+    assert Area(obstacles=(rock,)).local(FRAME).own_margins_m == (margin_m,)
+
+
 def test_few_points_and_many_points_agree():
     area = local(islands(3))
     points = np.random.default_rng(0).uniform(-400.0, 400.0, (900, 2))
@@ -104,6 +110,11 @@ def test_the_planners_wkt():
     assert west.bounds[2] < 45.0 < 105.0 < east.bounds[0]
     with pytest.raises(ValueError, match="no water is left"):
         area.fence_wkt(80.0)
+
+
+def test_of_two_waters_as_near_the_larger_is_planned_in():
+    waters = shapely.MultiPolygon([shapely.box(-30.0, -10.0, -20.0, 10.0), shapely.box(20.0, -10.0, 90.0, 10.0)])
+    assert shapely.from_wkt(local([], limits=waters).fence_wkt(0.0, (0.0, 0.0))).bounds[0] == 20.0
 
 
 def test_inclusions_intersect_and_circles_err_to_the_safe_side():

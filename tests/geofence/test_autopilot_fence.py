@@ -1,5 +1,6 @@
 """The autopilot's fence: contains what it must, stays inside the margin, proved on the items that go up."""
 
+import dataclasses
 import math
 import pathlib
 
@@ -429,6 +430,15 @@ def test_a_plane_is_wrong_by_no_more_than_it_says_on_the_earth_and_on_the_autopi
     assert plane.error < 0.0075 + 3.0 * radius_m / 6.0e6
 
 
+def test_a_plane_is_as_wrong_of_what_lies_to_the_south_as_of_what_lies_to_the_north():
+    equator = GeoPoint(lat_deg=0.0, lon_deg=10.0)
+    south, north = (
+        plane_of(Area(obstacles=(Obstacle(shape=Circle(GeoPoint(lat_deg=lat, lon_deg=10.0), 10_000.0)),)), equator)
+        for lat in (-0.2, 0.2)
+    )
+    assert south.error == pytest.approx(north.error)
+
+
 @pytest.mark.parametrize("radius", [2.0, 40.0, 900.0, 40_000.0])
 def test_a_circle_is_drawn_around_or_inside_of_it_to_5_mm(radius):
     for inside in (False, True):
@@ -561,6 +571,20 @@ def test_of_water_that_falls_apart_where_it_is_narrow_the_largest_part_is_thinne
     assert shapely.covers(both, found)
     assert shapely.covers(found, core)
     assert len(found.exterior.coords) < 60
+
+
+def test_water_that_is_narrower_than_the_tolerance_is_not_thinned():
+    """Less a quarter or 3 % of the tolerance nothing of it is left, and with fewer corners it would reach onto land."""
+    x = np.arange(0.0, 400.0, 2.0)
+    shore = np.column_stack([x, 0.3 * (np.arange(len(x)) % 2)])
+    creek = Polygon(np.vstack([shore, shore[::-1] + np.array([0.0, 0.5])]))
+    assert _thinned(creek, 20.0, inward=True) == creek
+
+
+def test_a_fence_that_holds_less_than_all_says_how_much():
+    part = AutopilotFence(status=FenceStatus.OK, reason="", margin_m=10.0, reach_m=120.0)
+    assert "within 120 m of the straight way" in part.left_out
+    assert dataclasses.replace(part, reach_m=math.inf).left_out == ""
 
 
 def test_the_smallest_circle_round_a_polygon_holds_all_its_corners():
