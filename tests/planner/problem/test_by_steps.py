@@ -64,6 +64,13 @@ def test_a_boat_that_lies_still_is_met_while_the_vessel_is_in_force(t0, t1, met)
     assert target_hit(problem, (5.1, 0.0), (5.1, 0.0), t0, t1) is None
 
 
+@pytest.mark.parametrize(("off_m", "met"), [(10.0, None), (9.99, 0)])
+def test_a_disc_that_is_only_touched_is_not_met(off_m, met):
+    target = Target(x_m=off_m, y_m=50.0, vx_mps=0.0, vy_mps=0.0, radius_m=10.0)
+    problem = replace(Problem.from_json(simple()), targets=(target,))
+    assert target_hit(problem, (0.0, 0.0), (0.0, 100.0), 0.0, 60.0) == met
+
+
 def test_of_two_vessels_the_first_that_is_met_is_named_and_a_turn_in_place_takes_time_to_be_met_in():
     far = Target(x_m=500.0, y_m=0.0, vx_mps=0.0, vy_mps=0.0, radius_m=5.0)
     by = Target(x_m=-30.0, y_m=0.0, vx_mps=10.0, vy_mps=0.0, radius_m=2.0, until_s=4.0)  # over the start after 3 s
@@ -201,6 +208,34 @@ def test_a_boat_that_cannot_tack_gybes_round_by_a_leg_with_room():
     assert not any("cannot tack" in reason for reason in round_by.reasons)
     short = evaluate(problem, [[0, 0], [50, 50], [55, 45], [52, 42], [0, 100]])
     assert any("has turned" in reason for reason in short.reasons)
+
+
+@pytest.mark.parametrize(("course_deg", "is_refused"), [(-80.0, True), (-94.0, True), (-96.0, False)])
+def test_a_boat_that_cannot_tack_turns_through_the_stern_with_ten_degrees_to_spare(course_deg, is_refused):
+    """From 95 degrees on one side to 94 on the other are 171 through the stern."""
+    course, boat = math.radians(course_deg), simple()["boat"] | {"can_tack": False, "gybe_room_m": 10}
+    end = (90.0 * math.sin(course), 90.0 * math.cos(course))
+    problem = Problem.from_json(simple(boat=boat, start={"x": 0, "y": 0, "heading_deg": 95}))
+    assert any("cannot tack" in reason for reason in evaluate(problem, [(0, 0), end]).reasons) is is_refused
+
+
+def test_a_leg_right_into_the_wind_is_no_tack_for_a_boat_that_cannot_tack():
+    problem = Problem.from_json(simple(boat=simple()["boat"] | {"can_tack": False, "gybe_room_m": 10}))
+    reasons = evaluate(problem, [[0, 0], [0, 99]]).reasons
+    assert len(reasons) == 1
+    assert "no-go" in reasons[0]
+
+
+@pytest.mark.parametrize("off_deg", [-40.0, -10.0, 0.0, 25.0, 44.0])
+def test_a_beat_off_the_wind_is_as_long_on_each_tack_as_makes_the_leg_good(off_deg):
+    """One board to the corner and one to the end, by the law of sines; each crosses the corridor from edge to edge."""
+    half, off, length = math.radians(45.0), math.radians(off_deg), 400.0
+    problem = Problem.from_json(simple(boat=simple()["boat"] | {"speed": POLAR}))
+    beat = Beat(no_go_half_rad=half, corridor_m=20.0, clearance_m=5.0, tack_s=6.0)
+    takes_s, tacks = beat_s(problem, beat, length * math.sin(off), length * math.cos(off))
+    right, left = (length * math.sin(half + side * off) / math.sin(2.0 * half) for side in (1.0, -1.0))
+    assert tacks == pytest.approx(right * math.sin(half - off) / 20.0)
+    assert takes_s == pytest.approx((right + left) / problem.boat.speed_mps(half) + 6.0 * tacks)
 
 
 @pytest.mark.parametrize(("set_deg", "along"), [(0.0, 1.0), (180.0, -1.0)])

@@ -44,6 +44,14 @@ from tests.planner.problems import box, random_problems, simple
             },
             "boat.speed.twa_deg",
         ),
+        (
+            {"boat": simple()["boat"] | {"speeds": {"tws_mps": [2, 6], "twa_deg": [0, 90], "v_mps": [[0, 1], [0]]}}},
+            "boat.speeds",
+        ),
+        (
+            {"boat": simple()["boat"] | {"speeds": {"tws_mps": [2], "twa_deg": [90, 0], "v_mps": [[0, 1]]}}},
+            "boat.speeds.twa_deg",
+        ),
     ],
 )
 def test_what_cannot_be_read_names_the_place(change, place):
@@ -116,6 +124,38 @@ def test_the_zone_widens_with_probability_and_time():
     ar1 = {"model": "ar1", "sigma0_deg": 2, "sigma_inf_deg": 8, "rho_hz": 0.01}
     q = Problem.from_json(simple(delta_s=0.8, wind={"from_deg": 0, "sigma": ar1}))
     assert math.degrees(q.no_go_half_rad(1e9)) == pytest.approx(45 + norm.ppf(0.8) * 8)
+
+
+@pytest.mark.parametrize(
+    ("delta_s", "growth", "widest_deg"), [(0.8, 0.5, math.inf), (0.8, 0.0, 45 + 3 * norm.ppf(0.8)), (0.5, 0.5, 45)]
+)
+def test_a_zone_has_no_widest_where_what_is_unsure_of_the_wind_grows_without_end(delta_s, growth, widest_deg):
+    sigma = {"model": "kalman", "sigma0_deg": 3, "growth_deg_per_sqrt_s": growth}
+    p = Problem.from_json(simple(delta_s=delta_s, wind={"from_deg": 0, "sigma": sigma}))
+    assert math.degrees(p.no_go_max_rad) == pytest.approx(widest_deg)
+    assert math.degrees(p.no_go_min_rad) == pytest.approx(45 + 3 * norm.ppf(delta_s))
+    assert p.is_time_varying == math.isinf(widest_deg)
+
+
+@pytest.mark.parametrize(("wind_deg", "ground_deg", "turn_deg"), [(90, 110, 20), (350, 10, 20), (10, 350, -20)])
+def test_a_wind_over_the_ground_from_further_right_has_a_positive_turn(wind_deg, ground_deg, turn_deg):
+    wind = {"from_deg": wind_deg, "speed_mps": 5, "sigma": {"model": "none"}}
+    p = Problem.from_json(simple(wind=wind, zone={"from_deg": ground_deg, "half_deg": 55}))
+    assert math.degrees(p.ground_turn_rad) == pytest.approx(turn_deg)
+    assert Problem.from_json(simple(wind=wind)).ground_turn_rad == 0.0
+
+
+def test_a_vessel_of_which_only_the_least_is_said_lies_still_for_ever_and_so_does_what_is_unsure_of_it():
+    spread = {"vessel": 3, "x": 1, "y": 2, "course_deg": 90, "keep_m": 5, "along_m": 6, "across_m": 7, "sigma_m": 8}
+    target = Problem.from_json(simple(targets=[{"x": 1, "y": 2, "radius_m": 5, "spread": spread}])).targets[0]
+    assert (target.vx_mps, target.vy_mps, target.growth_mps) == (0.0, 0.0, 0.0)
+    assert (target.from_s, target.until_s, target.name) == (0.0, math.inf, "")
+    of = target.spread
+    assert (of.along_mps, of.across_mps, of.own_mps, of.sigma_mps) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_current_of_which_only_the_drift_is_said_sets_to_the_north():
+    assert Problem.from_json(simple(current={"drift_mps": 0.4})).current.en_mps == (0.0, 0.4)
 
 
 @pytest.mark.parametrize(
