@@ -14,7 +14,7 @@ from companion.planner import Problem, plan
 from companion.planner.explain import explain
 from companion.planner.plan import Plan
 from companion.planner.problem import defect_of, evaluate
-from companion.planner.risk.arrival import arrival, in_words, limits_in_words
+from companion.planner.risk.arrival import _Averaged, arrival, in_words, limits_in_words
 from tests.planner.problem_json import to_dict
 
 BOAT = Boat(polar=ardurover_sitl())
@@ -247,3 +247,52 @@ def test_a_shape_error_of_another_length_is_refused():
     for wrong in ((0.1,), (0.1,) * 6 + (1.5,), (-0.1,) * 7):
         assert "shape_error is not 7 numbers" in defect_of(replace(p, boat=replace(p.boat, shape_error=wrong)))
     assert defect_of(replace(p, boat=replace(p.boat, shape_error=(0.1,) * 7))) == defect_of(p)
+
+
+@pytest.mark.parametrize("a", [3e-4, 9e-4, 2e-3, 0.05, 0.7, 4.0])
+def test_the_mean_over_a_step_has_the_variance_and_the_memory_of_such_a_process(a):
+    """Of a Gauss-Markov process, integrated over two steps that follow each other."""
+    x, w = np.polynomial.legendre.leggauss(60)
+    x, w = 0.5 * (x + 1.0), 0.5 * w
+    share = float(np.sum(w * 2.0 * (1.0 - x) * np.exp(-a * x)))
+    next_one = float(np.sum(w * x * np.exp(-a * x)) + np.sum(w * (1.0 - x) * np.exp(-a * (1.0 + x))))
+    found = _Averaged.of(a * 60.0, 60.0)
+    assert found.share == pytest.approx(share, rel=1e-6)
+    assert found.keep == pytest.approx(next_one / share, abs=4e-4)
+    drawn = found.drawn(np.random.default_rng(1).standard_normal((40, 20_000)))
+    assert drawn.std(axis=1) == pytest.approx(np.ones(40), abs=0.03)
+    assert np.mean(drawn[20] * drawn[21]) == pytest.approx(found.keep, abs=0.03)
+
+
+@pytest.mark.parametrize("bearing_deg", [50.0, 75.0, 120.0, 165.0, -120.0])
+def test_in_a_wind_that_does_not_spread_she_arrives_when_the_plan_says(bearing_deg):
+    to = math.radians(bearing_deg)
+    p = problem(sigma=0.0, goal=(600.0 * math.sin(to), 600.0 * math.cos(to)))
+    found, planned_s = arrival(p, reach(p)), reach(p)[-1].end_s
+    assert (found.early_s, found.late_s) == (pytest.approx(planned_s, rel=3e-4), pytest.approx(planned_s, rel=3e-4))
+
+
+def test_a_tack_that_seldom_fails_takes_no_time_in_most_winds():
+    p = problem(sigma=0.0, goal=(0.0, 300.0), tack_fails=0.01)
+    legs = evaluate(p, [(0.0, 0.0), (150.0, 150.0), (0.0, 300.0)]).legs
+    found, sure = (arrival(replace(p, boat=replace(p.boat, tack_fails=f)), legs) for f in (0.01, 0.0))
+    assert (found.early_s, found.median_s) == (
+        pytest.approx(sure.early_s, abs=1e-6),
+        pytest.approx(sure.median_s, abs=1),
+    )
+
+
+def test_where_she_may_never_arrive_the_boats_limit_is_asked_for_five_times_the_plans_time():
+    p = problem(0.6, 0.6, 1e5, max_tws_mps=4.0)
+    planned_s = reach(p)[-1].end_s
+    strength = replace(
+        p.wind.strength,
+        horizon_s=(0.0, planned_s, 4.9 * planned_s, 5.1 * planned_s),
+        mean_mps=(0.6,) * 4,
+        sigma_mps=(0.6, 0.6, 0.6, 5.0),
+    )
+    p = replace(p, wind=replace(p.wind, strength=strength))
+    found = arrival(p, reach(p))
+    assert math.isinf(found.late_s)
+    assert found.over_max == pytest.approx(strength.over(4.0, 5.0 * planned_s))
+    assert found.over_max > 10.0 * strength.over(4.0, 4.9 * planned_s)

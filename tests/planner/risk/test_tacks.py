@@ -3,17 +3,18 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.boat.failed_tack import RISKY
+from companion.boat.failed_tack import MOST_FAILURES, RISKY
 from companion.planner import Problem, plan
 from companion.planner.problem import evaluate
 from companion.planner.problem.value import defect_of
 from companion.planner.risk.chance_constraint import path_risk
-from companion.planner.risk.tacks import of_risky, tacks_at_risk
+from companion.planner.risk.tacks import TackAtRisk, in_words, of_risky, tacks_at_risk
 from companion.planner.solve import CONTACT_S, DEARER
 from tests.planner.problem_json import to_dict
 
@@ -165,3 +166,84 @@ def test_a_current_that_is_believed_carries_her_while_a_tack_fails_and_nowhere_e
     assert after.risk > before.risk
     assert Problem.from_json(to_dict(adrift)).adrift == adrift.adrift
     assert defect_of(channel(adrift={"set_deg": 90.0, "drift_mps": -0.4}))
+
+
+def about(turn_deg, *, off_deg=0.0, corridor_m=20.0, length_m=300.0, walls=((-40.0, -25.0), (32.0, 60.0)), beat=True):
+    """Return a channel with unlike walls, its beat ``off_deg`` from the wind, all of it turned about by one angle."""
+    turn = math.radians(turn_deg)
+
+    def turned(x, y):
+        return math.cos(turn) * x + math.sin(turn) * y, math.cos(turn) * y - math.sin(turn) * x
+
+    shapes = [
+        shapely.Polygon([turned(x, y) for x, y in ((a, -50.0), (b, -50.0), (b, 400.0), (a, 400.0))]) for a, b in walls
+    ]
+    goal = turned(0.0, length_m)
+    p = Problem.from_json(
+        {
+            "start": {"x": 0, "y": 0, "heading_deg": 45 + turn_deg},
+            "goal": {"x": goal[0], "y": goal[1], "radius": 5},
+            "obstacles": [shape.wkt for shape in shapes],
+            "wind": {"from_deg": turn_deg + off_deg, "speed_mps": 5, "sigma": {"model": "none"}},
+            "boat": BOAT | {"tack_fails": 0.05, "lee_mps": [0.2, 0.4]},
+            "current": {"set_deg": 60 + turn_deg, "drift_mps": 0.0},
+            "delta_s": 0.9,
+            "beat": {"no_go_half_deg": 45, "corridor_m": corridor_m, "clearance_m": 5, "tack_s": 4} if beat else None,
+        }
+    )
+    path = [(0.0, 0.0), goal] if beat else [(0.0, 0.0), turned(20.0, 20.0), turned(-15.0, 55.0), turned(0.0, 70.0)]
+    return tacks_at_risk(p, evaluate(p, path).legs), turned
+
+
+@pytest.mark.parametrize("turn_deg", [70.0, 155.0, 260.0])
+@pytest.mark.parametrize("beat", [True, False])
+def test_a_channel_turned_about_has_the_tacks_at_risk_that_it_has(turn_deg, beat):
+    here, _ = about(0.0, off_deg=10.0 * beat, beat=beat)
+    there, turned = about(turn_deg, off_deg=10.0 * beat, beat=beat)
+    assert here
+    for a, b in zip(here, there, strict=True):
+        assert (b.leg, b.failures) == (a.leg, a.failures)
+        assert (b.risk, b.lack_m) == (pytest.approx(a.risk), pytest.approx(a.lack_m, abs=1e-6))
+        places = np.array([turned(*a.at_en), b.at_en]) @ np.array([turned(1.0, 0.0), turned(0.0, 1.0)]).T
+        aside = places[:, :1] if beat else places  # along a straight wall all places of a beat are alike
+        assert aside[1] == pytest.approx(aside[0], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("walls", "side"), [(((-40.0, -21.0), (27.0, 60.0)), -1.0), (((-60.0, -27.0), (21.0, 40.0)), 1.0)]
+)
+def test_of_a_beat_the_tack_that_touches_soonest_is_named_at_the_edge_of_the_corridor(walls, side):
+    [tack], _ = about(0.0, walls=walls)
+    [alone], _ = about(0.0, walls=[wall for wall in walls if side * wall[0] > 0.0])
+    [other], _ = about(0.0, walls=[wall for wall in walls if side * wall[0] < 0.0])
+    assert tack.at_en[0] == pytest.approx(side * 20.0)
+    assert tack.failures == alone.failures < other.failures
+    assert tack.lack_m == pytest.approx(alone.lack_m)
+    assert tack.risk == pytest.approx(alone.risk + other.risk)  # of all tacks, each as likely anywhere
+
+
+def test_the_edges_of_a_short_beat_are_looked_at_every_ten_metres_at_most():
+    [tack], _ = about(0.0, length_m=19.0)
+    assert min(abs(tack.at_en[1] - along) for along in (4.75, 14.25)) < 1e-6
+
+
+def test_the_failures_in_a_row_that_are_looked_at_are_one_to_five():
+    def failures(gap_m):
+        p = channel(0.3, width_m=400.0)
+        p = replace(p, boat=replace(p.boat, turn_rate_radps=0.001))  # no room to gybe: the row goes on
+        p = replace(p, obstacles=(shapely.box(40.0 + gap_m, -900.0, 90.0 + gap_m, 900.0),))
+        return [t.failures for t in tacks_at_risk(p, evaluate(p, [(0, 0), (40, 40), (0, 80)]).legs)]
+
+    seen = [failures(float(gap_m)) for gap_m in range(2, 60)]
+    assert seen == sorted(seen, key=lambda row: row or [math.inf])
+    assert [row[0] for row in seen if row] == sorted(row[0] for row in seen if row)
+    assert {row[0] for row in seen if row} == set(range(1, MOST_FAILURES + 1))
+    assert seen[-1] == []
+
+
+def test_a_tack_that_may_touch_is_told_with_how_often_it_has_to_fail():
+    once, twice = (TackAtRisk(leg=1, at_en=(20.4, -31.0), failures=n, risk=0.3**n, lack_m=1.0) for n in (1, 2))
+    told = list(in_words(channel(0.3), (once, twice)))
+    assert told[0] == "A tack that fails once at 20 E, -31 N would bring her onto something: 30 % at 30 % for one."
+    assert "fails 2 times in a row" in told[1]
+    assert "9 % at 30 % for one" in told[1]

@@ -10,16 +10,18 @@ from hypothesis import strategies as st
 
 from bench.vessels import SCENES, holds, keep_of, met, problem, ship
 from bench.winds import simulate_entries
-from companion.messages import Target
+from companion.messages import Spread, Target
 from companion.planner import Plan, Problem, plan
 from companion.planner.explain import explain
 from companion.planner.problem.evaluate import evaluate
 from companion.planner.problem.parts import RiskLimit
 from companion.planner.problem.value import defect_of, resolved, sigmas_for
 from companion.planner.risk import kernels
-from companion.planner.risk.chance_constraint import path_risk
+from companion.planner.risk.chance_constraint import VESSELS_PROMISE_FACTOR, VesselRisk, path_risk, vessel_risk
 from companion.traffic.predict import tail_factor
 from tests.planner.problem_json import to_dict
+
+SIGMA_M = 70.0
 
 
 @pytest.mark.parametrize("clearance_m", [0.0, 50.0])
@@ -92,6 +94,81 @@ def test_without_uncertain_vessels_all_of_it_is_the_winds():
     found = plan(certain, expansions=1000, seed=1)
     assert found.vessel_risk == 0.0
     assert path_risk(certain, found).total == path_risk(certain, found).wind
+
+
+# ----------------------------------------------------------------------------- a path's legs, one after the other
+PASSES = 0.5 * (math.erf(20.0 / SIGMA_M / 2.0**0.5) + math.erf(40.0 / SIGMA_M / 2.0**0.5))  # a miss of 10 m, 30 m kept
+
+
+def leg(from_s, until_s, *, metres=0.0):
+    """Return a leg to the north from where the boat lies, of so many metres."""
+    first = evaluate(problem((), keep_of()), [(0.0, 0.0), (900.0, 0.0)]).legs[0]
+    return replace(first, from_en=(0.0, 0.0), to_en=(0.0, metres), start_s=from_s, end_s=until_s, length_m=metres)
+
+
+def passing(from_s, until_s, vessel=1, **more):
+    """Return a vessel that passes 10 m to the east of the boat's place in the middle of its time; 30 m are kept."""
+    start_m = -5.0 * 0.5 * (until_s + from_s)  # where it is at 0 s
+    spread = Spread(
+        vessel=vessel,
+        x_m=10.0,
+        y_m=start_m,
+        course_rad=0.0,
+        keep_m=30.0,
+        along_m=5.0,
+        across_m=SIGMA_M,
+        along_mps=0.0,
+        across_mps=0.0,
+        own_mps=0.0,
+        sigma_m=SIGMA_M,
+        sigma_mps=0.0,
+    )
+    target = Target(x_m=10.0, y_m=start_m, vy_mps=5.0, radius_m=30.0, from_s=from_s, until_s=until_s, spread=spread)
+    return replace(target, **more)
+
+
+def met_by(targets, legs):
+    return vessel_risk(replace(problem((), keep_of()), targets=tuple(targets)), legs)
+
+
+def test_a_vessel_that_comes_by_twice_is_met_twice_and_two_vessels_add_up():
+    once = met_by([passing(0.0, 100.0)], [leg(0.0, 300.0)])
+    assert once.computed == pytest.approx(PASSES, rel=0.02)
+    for second in (passing(100.0, 300.0), passing(0.0, 100.0, vessel=2), passing(100.0, 300.0, vessel=2)):
+        both = met_by([passing(0.0, 100.0), second], [leg(0.0, 300.0)])
+        assert both.computed == pytest.approx(2.0 * PASSES, rel=0.02)
+    assert once.worst_instant == pytest.approx(PASSES, rel=0.02)
+    upon_her = passing(100.0, 300.0, x_m=0.0, y_m=0.0, vy_mps=0.0)
+    upon_her = replace(upon_her, spread=replace(upon_her.spread, x_m=0.0, y_m=0.0, along_m=SIGMA_M))
+    inside = 1.0 - math.exp(-0.5 * (30.0 / SIGMA_M) ** 2)  # of a disc of 30 m about the middle
+    turned = met_by([passing(0.0, 100.0), upon_her], [leg(0.0, 300.0)])
+    assert turned.computed == pytest.approx(PASSES + inside, rel=0.02)
+    assert met_by([passing(0.0, 100.0), passing(0.0, 100.0, vessel=2)], [leg(0.0, 99.0)]).worst_instant == (
+        pytest.approx(2.0 * once.worst_instant)
+    )
+
+
+def test_the_leg_on_which_it_comes_by_has_the_risk_and_a_leg_that_never_ends_has_none():
+    targets = [passing(0.0, 100.0), passing(100.0, 300.0, vessel=2)]
+    legs = [leg(0.0, 100.0), leg(100.0, 300.0)]
+    risk = met_by(targets, legs)
+    assert risk.legs == pytest.approx((risk.total / 2.0, risk.total / 2.0), rel=0.02)
+    assert risk.total == pytest.approx(VESSELS_PROMISE_FACTOR * risk.computed)
+    assert risk.by_name == (
+        ("vessel 1", pytest.approx(risk.total / 2.0, rel=0.02)),
+        ("vessel 2", pytest.approx(risk.total / 2.0, rel=0.02)),
+    )
+    ended = met_by(targets, [legs[0], leg(100.0, math.inf)])
+    assert ended.legs == (pytest.approx(risk.total / 2.0, rel=0.02), 0.0)
+    assert met_by(targets, ()).legs == ()
+    assert met_by((), legs) == VesselRisk(legs=(0.0, 0.0))
+
+
+def test_a_boat_that_turns_before_a_leg_lies_there_meanwhile():
+    """She turns for a minute in which the vessel comes by, and is sixty metres on when it would have come else."""
+    turning = met_by([passing(0.0, 60.0)], [leg(60.0, 120.0, metres=600.0)])
+    assert turning.computed == pytest.approx(PASSES, rel=0.02)
+    assert met_by([passing(60.0, 120.0)], [leg(60.0, 120.0, metres=600.0)]).computed < 0.01
 
 
 @pytest.mark.parametrize("part", [0.0, 0.31, -0.1, math.nan])
