@@ -38,9 +38,7 @@ class Route:
     vessel_risk: float = 0.0  # the vessels' part of it
     vessels_part: float = 0.0  # of 1 - delta_s, at each instant, the vessels' part
     expected_clearance_m: float | None = None  # of the hull on the predicted track, the prediction's error taken off
-    planned_clearance_m: float | None = (
-        None  # that of the plan, where the way from her start has less, until it is left
-    )
+    planned_clearance_m: float | None = None  # the plan's, while the way from her start has less
     cost_s: float | None = None
     median_s: float | None = None  # when half the winds of the forecast's spread are there ...
     late_s: float | None = None  # ... and nine of ten; None: not told, or not in any time
