@@ -265,22 +265,20 @@ def _remember(ctx: StepContext) -> None:
         return
     # at rest no way is made, nor on a circle
     history = ctx.state.progress.history if ahead and not is_composed(ctx) else ()
-    if history and ctx.t_s - history[-1][0] < HISTORY_STEP_S:
+    plan_id = ctx.state.mission.route.plan_id if ctx.state.mission.route is not None else -1
+    is_new = ctx.state.progress.history_plan != plan_id
+    is_due = not history or ctx.t_s - history[-1][0] >= HISTORY_STEP_S
+    if not is_due and not is_new:
         return
     left = 0.0
     point = boat
     for following in ahead:
         left += distance_m(point, following)
         point = following
-    plan_id = ctx.state.mission.route.plan_id if ctx.state.mission.route is not None else -1
-    if history and ctx.state.progress.history_plan != plan_id:
+    if history and is_new and not ctx.is_field_steered:
         # A new plan may be longer or shorter: what it changed is no way made good, nor lost.
         longer = left - history[-1][3]
         history = tuple((t_s, east, north, togo + longer) for t_s, east, north, togo in history)
-    ctx.set(
-        progress=changed(
-            ctx.state.progress,
-            history=(*history, (ctx.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:],
-            history_plan=plan_id,
-        )
-    )
+    if is_due:
+        history = (*history, (ctx.t_s, boat[0], boat[1], left))[-HISTORY_KEPT:]
+    ctx.set(progress=changed(ctx.state.progress, history=history, history_plan=plan_id))

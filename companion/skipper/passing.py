@@ -38,6 +38,7 @@ def pass_gates(ctx: StepContext) -> None:
     boat = ctx.boat_en
     if boat is None:
         return
+    by_field = ctx.is_field_steered
     _approach(ctx)
     _cross(ctx)
     if ctx.gate is not None and ctx.gate.line is not None and not waits_for_gun(ctx, ctx.gate):
@@ -64,7 +65,8 @@ def pass_gates(ctx: StepContext) -> None:
         left = distance_m(boat, gate.en_m)
         counted = number in ctx.state.mission.route.gate_of[: ctx.state.mission.index]
         near = max(gate.radius_m, 0.0 if _is_own_count(ctx, gate) else _grid_m(ctx))
-        leaves = counted and left > near and (not _is_last(ctx) or _is_own_count(ctx, gate))
+        # A field leads to the last place itself, whatever of the mission on board is left.
+        leaves = counted and left > near and (not _is_last(ctx) or (_is_own_count(ctx, gate) and not by_field))
         if not (
             ctx.state.progress.closest_m <= gate.radius_m
             or (counted and left <= near and not _is_last(ctx))
@@ -105,7 +107,8 @@ def pass_gates(ctx: StepContext) -> None:
             if gate.buoy_en_m is not None:
                 how = f"left to {gate.side.value}, {distance_m(boat, gate.buoy_en_m):.1f} m off"
             elif is_counted:
-                how += f": the autopilot has passed it, its radius is {gate.radius_m:g} m"
+                passed = "passed in a turn" if ctx.is_steered else "the autopilot has passed it"
+                how += f": {passed}, its radius is {gate.radius_m:g} m"
             ctx.say(Severity.NOTICE, "goal", f"{gate.name} reached, {how}", every_s=0.0)
 
 
@@ -266,10 +269,13 @@ def _approach(ctx: StepContext) -> None:
 def _is_near_enough(ctx: StepContext, gate: Gate, counted: bool) -> bool:
     """Return whether the last goal counts as reached although its radius was not: Büsser's grid size, and no better.
 
-    The boat has been at the waypoint by the autopilot's count and loiters in the mission's safe end.
+    The boat has been at the waypoint by the count of who steers by the mission, and loiters in its safe end. A field
+    knows no waypoint: it leads to the goal itself.
     """
     route = ctx.state.mission.route
     if route is None or not counted or not _is_last(ctx) or ctx.state.progress.closest_m > _grid_m(ctx):
+        return False
+    if ctx.is_field_steered:
         return False
     at_end = ctx.state.mission.index >= len(route.items) - 1
     return at_end and (distance_m(route.points_en_m[-1], gate.en_m) > gate.radius_m or ctx.is_raised("mission ended"))

@@ -185,6 +185,23 @@ def test_what_we_steer_past_counts_by_its_radius_alone(off_m, is_reached, steere
     assert ctx.state.progress.missed == (0 if is_reached else 1)
 
 
+@pytest.mark.parametrize(("steered", "is_reached"), [(Guidance.HEADING, True), (Guidance.FIELD, False)])
+def test_by_field_the_last_goal_is_reached_by_its_radius_and_nothing_is_missed(steered, is_reached):
+    """ "G0 reached, 27 m from it: the autopilot has passed it": its loiter lay elsewhere, for want of room there."""
+    ctx = moment(
+        route((10.0, 100.0), (10.0, 160.0), gate_of=(0, -1)),
+        goals=(Goal(en_m=(10.0, 100.0), radius_m=10.0),),
+        at=(10.0, 122.0),
+        mission={"index": 1},
+        config={"guidance": steered, "grid_size_m": 30.0},
+        seen={"autopilot": replace(moment().autopilot, mode=Mode.GUIDED)},
+        progress={"closest_m": 22.0},
+    )
+    pass_gates(ctx)
+    assert ctx.state.progress.reached == ((0,) if is_reached else ())
+    assert ctx.state.progress.missed == 0
+
+
 @pytest.mark.parametrize(
     ("mode", "gate_of", "own_index"),
     [(Mode.GUIDED, (0, 1, -1), 0), (Mode.GUIDED, (-1, 1, -1), 1), (Mode.AUTO, (0, 1, -1), 1)],

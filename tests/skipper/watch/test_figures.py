@@ -11,6 +11,7 @@ from shapely.geometry import box
 from companion.boat.margins import AutopilotLimits
 from companion.messages import MissionState, Mode
 from companion.safety import BY_NAME, SENSORS, TABLE
+from companion.skipper.intake import locate
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.step.config import ALL_PERMITTED, Ends, Guidance
 from companion.skipper.step.context import StepContext
@@ -146,6 +147,17 @@ def history(*, window_s=180.0, made_m=30.0, plan=7):
 )
 def test_progress_is_the_way_made_good_in_three_minutes_of_one_plan(parts, figure):
     assert measure(moment(WAY, **parts), "no progress") == figure
+
+
+@pytest.mark.parametrize("guidance", [Guidance.PLAN, Guidance.FIELD])
+def test_a_new_plan_every_quarter_of_a_minute_is_no_progress_and_hides_none(guidance):
+    """Steered by field into a corner she was planned for every 14 s, and the watchdog began anew with each plan."""
+    guided = replace(moment().autopilot, mode=Mode.GUIDED if guidance is Guidance.FIELD else Mode.AUTO)
+    ctx = moment(WAY, config={"guidance": guidance}, seen={"autopilot": guided}, **history(plan=6))
+    locate(ctx)
+    assert measure(ctx, "no progress") == 30.0
+    is_moved = ctx.state.progress.history[-1][3] != 470.0  # by what the new plan is longer; a field follows none
+    assert is_moved is (guidance is Guidance.PLAN)
 
 
 @pytest.mark.parametrize(("speed_mps", "off_deg"), [(0.49, 0.0), (0.51, 30.0)])
