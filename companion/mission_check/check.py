@@ -9,6 +9,7 @@ from pathlib import Path
 
 import shapely
 
+from companion.boat import loiter_swing_m
 from companion.compose import field_findings_of, tide_of, voyage_of
 from companion.current import hour_words, span_words
 from companion.current.tide import ROWS_REMEDY
@@ -19,11 +20,12 @@ from companion.geofence.mission import place_troubles, read_mission
 from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
-from companion.skipper.planning import TRACKS_M
+from companion.skipper.planning import LACK_M, TRACKS_M
 from companion.skipper.way import KEEP_SHARE, SAME_M, Gate, Side
 
 HAIR_M = 0.005  # a depth is written in centimetres
 LEAST_NO_GO_DEG = 20.0  # an ice boat's
+WINDS_MPS = range(1, 13)  # in which a loiter is looked at: no gale is ordinary weather
 SMALL_M = 3.0  # a fix is good to 2.5 m
 
 
@@ -85,6 +87,7 @@ def check_mission(
                     *_marks_too_near(mission),
                     *_circles(mission),
                     *_drying(mission),
+                    *_boxes(mission),
                     *_tide(mission),
                 )
             ),
@@ -274,6 +277,35 @@ def _drying(mission: Mission) -> Iterator[Finding]:
                     place=place,
                     text=f"lies in {water.name}, which dries: she does not go there to stay",
                     remedy="choose a place that is deep enough at low water",
+                )
+
+
+def _boxes(mission: Mission) -> Iterator[Finding]:
+    """Yield the boxes in which a loiter has room in moderate winds only, and those that dry: either ends her stay."""
+    voyage = voyage_of(mission)
+    floor_m = min(mission.margin_floor_m, mission.margin_m)
+    for number, goal in enumerate(voyage.goals, start=1):
+        if goal.box is None:
+            continue
+        has_m = float(voyage.area.clearance_m([goal.en_m])[0])
+        winds = [tws for tws in WINDS_MPS if loiter_swing_m(voyage.boat.polar, tws) + floor_m - LACK_M > has_m]
+        if winds:
+            yield Finding(
+                severity=FindingLevel.WARNING,
+                code=Code.SMALL,
+                place=f"[[goal]] {number} polygon",
+                text=f"the roomiest place in it has {has_m:.0f} m about it: in {winds[0]} m/s of wind and more a "
+                f"loiter comes below the margin's floor of {floor_m:g} m there, and she gives the box up, or leaves it",
+                remedy="choose a box with more room about it, or let [area] margin_floor_m be smaller",
+            )
+        for water in voyage.drying:
+            if shapely.intersects_xy(water.polygon, *goal.en_m):
+                yield Finding(
+                    severity=FindingLevel.WARNING,
+                    code=Code.DRIES,
+                    place=f"[[goal]] {number} polygon",
+                    text=f"the roomiest place in it lies in {water.name}, which dries: her stay ends before it does",
+                    remedy="choose a box that is deep enough at low water",
                 )
 
 

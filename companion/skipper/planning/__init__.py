@@ -1,5 +1,6 @@
 """Planning under way: why, from where, with which step of the ladder, and what is done with the answer."""
 
+from companion.skipper.planning.diversions import LACK_M
 from companion.skipper.planning.next_tack import FOLLOWS, next_tack, next_tack_s, on_leg
 from companion.skipper.planning.statement import planned_forecast
 from companion.skipper.planning.track import TRACKS_M
@@ -20,6 +21,7 @@ __all__ = [
     "GIVE_UP_RISK",
     "HOME_RADIUS_M",
     "HORIZON_S",
+    "LACK_M",
     "OWN_TIMING_MPS",
     "PART_BY_RUNG",
     "SETTLED_M",
