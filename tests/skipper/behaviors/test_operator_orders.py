@@ -368,7 +368,7 @@ def test_given_up_nothing_is_asked_of_her_until_told_to_go_on():
     assert moves(world) == before
     assert world.count(act.RequestPlan) == len([a for _, a in world.actions if isinstance(a, act.RequestPlan)])
     assert "given up, ordered by the ground station" in world.state.why
-    assert answer(world, "hold").text.startswith("she is given up")
+    assert answer(world, "hold").text.startswith("she is given up, ordered by the ground station: ")
     assert answer(world, "why").result is Result.DONE
     answer(world, "go_on")
     assert world.run(1500, is_done)
