@@ -2,7 +2,7 @@
 import { get, set, svg } from "./dom.js";
 import { path } from "./geometry.js";
 import * as map from "./map.js";
-import { called, distanceTo, inserted, moved, placeOf, toEn, toPlace, within, withGoal } from "./sketch.js";
+import { called, distanceTo, inserted, moved, placeOf, ringEn, toEn, toPlace, within, withGoal } from "./sketch.js";
 
 /** @typedef {import("./sketch.js").Sketch} Sketch @typedef {import("./sketch.js").Ref} Ref @typedef {import("./sketch.js").Place} Place @typedef {import("./sketch.js").Point} Point @typedef {import("./sketch.js").Frame} Frame @typedef {import("./sketch.js").Shape} Shape @typedef {import("./geometry.js").Camera} Camera */
 /** What the chart asks of the editor. @typedef {{sketch: () => Sketch, frame: () => Frame, selected: () => Ref | null, select: (ref: Ref | null) => void, draft: (sketch: Sketch) => void, commit: (sketch: Sketch, ref?: Ref | null) => void}} Editor */
@@ -325,7 +325,7 @@ function over(at, camera) {
     const below = start && Math.abs(start[0] - x) < 50 && Math.abs(start[1] - y) < 20 ? start[1] + 30 : y + 18;   // the word at the start is above it
     out.push(svg("circle", { cx: x, cy: y, r: 15, class: "safeend" }), svg("text", { x: x + 18, y: below, class: "word small safe" }, "safe end"));
   }
-  sketch.shapes.forEach((shape, n) => { if (selected?.of !== "shape" || selected.n !== n) name(shape, on, camera, out); });
+  sketch.shapes.forEach((shape, n) => { if (selected?.of !== "shape" || selected.n !== n) name(shape, at, camera, out); });
   chosen(sketch, selected, on, out);
   if (pending.length > 0) {
     const points = pending.map(on);
@@ -361,13 +361,27 @@ function round(at, radius, side) {
   return svg("path", { d: `M${a[0]} ${a[1]}A${radius} ${radius} 0 1 ${turn > 0 ? 1 : 0} ${b[0]} ${b[1]}M${c[0]} ${c[1]}L${b[0]} ${b[1]}L${d[0]} ${d[1]}`, class: `rounding ${side}` });
 }
 
-/** @param {Shape} shape @param {(place: Place) => Point} on @param {Camera} camera @param {Element[]} out */
-function name(shape, on, camera, out) {
-  if (!shape.name || shape.zone === "inclusion") return;
-  const points = (shape.rings[0] ?? []).map(on);
-  const wide = Math.max(...points.map((p) => p[0])) - Math.min(...points.map((p) => p[0]));
-  const [x, y] = [points.reduce((sum, p) => sum + p[0], 0) / points.length, points.reduce((sum, p) => sum + p[1], 0) / points.length];
-  if (shape.type === "polygon" && wide < 5.5 * shape.name.length) return;
+/** @type {WeakMap<readonly Point[], {at: Point, wide_m: number}>} */
+const spots = new WeakMap();
+
+/** Where the name of a ring stands, and how wide it is, asked of its corners once. @param {readonly Point[]} ring */
+function spot(ring) {
+  let known = spots.get(ring);
+  if (known === undefined) {
+    let [east, north, least, most] = [0, 0, Infinity, -Infinity];
+    for (const [e, n] of ring) { east += e; north += n; least = Math.min(least, e); most = Math.max(most, e); }
+    spots.set(ring, known = { at: [east / ring.length, north / ring.length], wide_m: most - least });
+  }
+  return known;
+}
+
+/** @param {Shape} shape @param {(en: Point) => Point} at @param {Camera} camera @param {Element[]} out */
+function name(shape, at, camera, out) {
+  const ring = shape.rings[0] ?? [];
+  if (!shape.name || shape.zone === "inclusion" || ring.length === 0) return;
+  const known = spot(ringEn(editor.frame(), ring));
+  if (shape.type === "polygon" && known.wide_m * camera.scale < 5.5 * shape.name.length) return;
+  const [x, y] = at(known.at);
   out.push(svg("text", { x, y: shape.type === "polygon" ? y + 4 : y - 10, class: "word small landword", "text-anchor": "middle" }, shape.name));
 }
 

@@ -3,7 +3,7 @@ import * as chart from "./chart.js";
 import { el, get, set, table } from "./dom.js";
 import { bearing, distance, duration, percent, speedUnit, units } from "./format.js";
 import * as map from "./map.js";
-import { called, degrees, History, middle, placeOf, places, removed, toEn } from "./sketch.js";
+import { called, degrees, History, middle, placeOf, places, removed, ringEn, toEn } from "./sketch.js";
 import * as tables from "./tables.js";
 import * as water from "./water.js";
 
@@ -69,19 +69,28 @@ function marks() {
 /** @param {Place} place */
 const en = (place) => toEn(state.frame, place);
 
-/** A circle as a ring. @param {Place} at @param {number} radius @returns {Point[]} */
-function circle(at, radius) {
-  const [e, n] = en(at);
-  return Array.from({ length: SIDES }, (_, k) => /** @type {Point} */ ([e + radius * Math.sin(2 * Math.PI * k / SIDES), n + radius * Math.cos(2 * Math.PI * k / SIDES)]));
+/** @type {WeakMap<readonly Place[], {frame: import("./sketch.js").Frame, radius: number, points: Point[]}>} */
+const circles = new WeakMap();
+
+/** A circle as a ring, made once. @param {readonly Place[]} ring its middle @param {number} radius @returns {Point[]} */
+function circle(ring, radius) {
+  let known = circles.get(ring);
+  if (known?.frame !== state.frame || known.radius !== radius) {
+    const [e, n] = en(ring[0] ?? [0, 0]);
+    known = { frame: state.frame, radius, points: Array.from({ length: SIDES }, (_, k) => /** @type {Point} */ ([e + radius * Math.sin(2 * Math.PI * k / SIDES), n + radius * Math.cos(2 * Math.PI * k / SIDES)])) };
+    circles.set(ring, known);
+  }
+  return known.points;
 }
 
-/** @param {Sketch} sketch @returns {Area} */
+/** What lies on the water. A ring that is as it was is the one that it was: what is drawn of it stays. @param {Sketch} sketch @returns {Area} */
 function area(sketch) {
-  const drawn = sketch.shapes.map((shape) => ({ zone: shape.zone, rings: shape.type === "polygon" ? shape.rings.map((ring) => ring.map(en)) : shape.type === "line" ? [] : [circle(shape.rings[0]?.[0] ?? [0, 0], shape.radius_m ?? sketch.point_radius_m)] }));
-  const locked = state.locked.map((shape) => ({ zone: shape.zone, rings: shape.rings.map((ring) => ring.map(en)) }));
+  const ring = (/** @type {Place[]} */ one) => ringEn(state.frame, one);
+  const drawn = sketch.shapes.map((shape) => ({ zone: shape.zone, rings: shape.type === "polygon" ? shape.rings.map(ring) : shape.type === "line" ? [] : [circle(shape.rings[0] ?? [], shape.radius_m ?? sketch.point_radius_m)] }));
+  const locked = state.locked.map((shape) => ({ zone: shape.zone, rings: shape.rings.map(ring) }));
   const of = (/** @type {string} */ zone) => [...drawn, ...locked].filter((shape) => shape.zone === zone && shape.rings.length > 0).map((shape) => shape.rings);
-  const grown = (found?.grown ?? []).map((shape) => shape.map((ring) => ring.map(en)));
-  return /** @type {Area} */ (/** @type {unknown} */ ({ hash: "", name: state.called, origin_lat_deg: state.frame.lat, origin_lon_deg: state.frame.lon, lat_m: state.frame.lat_m, lon_m: state.frame.lon_m, drying: state.drying.map((water) => ({ name: water.name, shapes: [water.rings.map((ring) => ring.map(en))], solid_unix_s: water.solid_unix_s })), obstacles: of("exclusion"), names: [], limits: of("inclusion"), grown, margin_m: sketch.margin_m }));
+  const grown = (found?.grown ?? []).map((shape) => shape.map(ring));
+  return /** @type {Area} */ (/** @type {unknown} */ ({ hash: "", name: state.called, origin_lat_deg: state.frame.lat, origin_lon_deg: state.frame.lon, lat_m: state.frame.lat_m, lon_m: state.frame.lon_m, drying: state.drying.map((water) => ({ name: water.name, shapes: [water.rings.map(ring)], solid_unix_s: water.solid_unix_s })), obstacles: of("exclusion"), names: [], limits: of("inclusion"), grown, margin_m: sketch.margin_m }));
 }
 
 /** The sketch as the map knows a voyage: the boat lies at the start. @param {Sketch} sketch @returns {View} */

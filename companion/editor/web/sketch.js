@@ -24,6 +24,16 @@ export function toEn(frame, place) {
   return [east * frame.lon_m, (place[0] - frame.lat) * frame.lat_m];
 }
 
+/** @type {WeakMap<readonly Place[], {frame: Frame, points: Point[]}>} */
+const inMetres = new WeakMap();
+
+/** A ring in metres, made once: a sketch that is another one has most of its rings from the one before. @param {Frame} frame @param {readonly Place[]} ring @returns {Point[]} */
+export function ringEn(frame, ring) {
+  let known = inMetres.get(ring);
+  if (known?.frame !== frame) inMetres.set(ring, known = { frame, points: ring.map((place) => toEn(frame, place)) });
+  return known.points;
+}
+
 /** @param {Frame} frame @param {Point} en @returns {Place} */
 export function toPlace(frame, en) {
   let lon = frame.lon + en[0] / frame.lon_m;

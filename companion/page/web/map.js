@@ -166,19 +166,29 @@ export function again() {
   draw();
 }
 
-/** What does not move. */
+/** @type {WeakMap<readonly Point[], string>} each ring is written once */
+const written = new WeakMap();
+/** @type {Record<string, (readonly Point[])[]>} the rings that a layer shows */
+const shown = {};
+
+/** What does not move. What a layer shows already stays: of an area that is another one most is as it was. */
 function water() {
-  for (const name of ["limits", "grown", "drying", "obstacles"]) layers[name]?.replaceChildren();
   const key = document.getElementById("dryingkey");
   if (key) key.hidden = !state.area?.drying.length;
-  if (state.area === null) return;
-  const rings = (/** @type {[number, number][][]} */ shape) => shape.map((ring) => path(ring, true)).join("");
-  const draw = (/** @type {string} */ name, /** @type {[number, number][][][]} */ shapes) =>
-    layers[name]?.append(svg("path", { d: shapes.map(rings).join(""), "fill-rule": "evenodd" }));
-  draw("grown", state.area.grown);
-  draw("obstacles", state.area.obstacles);
-  draw("limits", state.area.limits);
-  for (const water of state.area.drying) draw("drying", water.shapes);
+  const ring = (/** @type {Point[]} */ points) => {
+    let text = written.get(points);
+    if (text === undefined) written.set(points, text = path(points, true));
+    return text;
+  };
+  const draw = (/** @type {string} */ name, /** @type {Point[][][][]} */ pictures) => {
+    const rings = pictures.flat(2), before = shown[name] ?? [];
+    if (rings.length === before.length && rings.every((one, n) => one === before[n]) && layers[name]?.children.length === pictures.length) return;
+    shown[name] = rings;
+    fill(name, pictures.map((shapes) => svg("path", { d: shapes.flat().map(ring).join(""), "fill-rule": "evenodd" })));
+  };
+  const { area } = state;
+  for (const name of /** @type {const} */ (["grown", "obstacles", "limits"])) draw(name, area === null ? [] : [area[name]]);
+  draw("drying", (area?.drying ?? []).map((water) => water.shapes));
 }
 
 /** Water that dries, as it is at the moment that is shown. @param {View | null} view */
@@ -241,13 +251,24 @@ function grid(at) {
   fill("grid", [svg("path", { d: lines.join("") })]);
 }
 
+/** @type {Record<string, readonly unknown[]>} what the track in a layer was drawn of: it lies in metres, and the camera is nothing to it */
+const tracked = {};
+
+/** Is a track drawn of this already? @param {string} name @param {readonly unknown[]} made */
+function isTracked(name, made) {
+  const before = tracked[name];
+  tracked[name] = made;
+  return before !== undefined && made.every((one, n) => one === before[n]);
+}
+
 function track() {
   const past = state.past;
-  if (past === null) return fill("track", []);
   // what has not come yet of a recorded voyage is shown faintly: what was known then against what came
-  const now = state.view?.t_s ?? Infinity;
-  let count = past.t_s.length;
-  while (count > 0 && (past.t_s[count - 1] ?? 0) > now + 0.05) count -= 1;
+  const now = state.view?.t_s ?? Infinity, length = past?.t_s.length ?? 0;
+  let count = length;
+  while (past !== null && count > 0 && (past.t_s[count - 1] ?? 0) > now + 0.05) count -= 1;
+  if (isTracked("track", [past, length, past?.t_s[0], past?.t_s[length - 1], count])) return;   // a past grows at its end, and is cut at its beginning
+  if (past === null) return fill("track", []);
   const pieces = byTack(past.east_m.slice(0, count), past.north_m.slice(0, count), past.starboard.slice(0, count));
   const children = pieces.map((piece) => svg("path", {
     d: path(piece.points), class: piece.starboard === null ? "unknown" : piece.starboard ? "starboard" : "port" }));
@@ -360,6 +381,20 @@ function previewed(at) {
   fill("preview", children);
 }
 
+/** @type {WeakMap<readonly Point[], [number, number, number, number]>} */
+const extents = new WeakMap();
+
+/** How far a ring reaches east, west, south and north, asked of its corners once. @param {readonly Point[]} ring */
+function extent(ring) {
+  let known = extents.get(ring);
+  if (known === undefined) {
+    known = [-Infinity, Infinity, Infinity, -Infinity];
+    for (const [e, n] of ring) known = [Math.max(known[0], e), Math.min(known[1], e), Math.min(known[2], n), Math.max(known[3], n)];
+    extents.set(ring, known);
+  }
+  return known;
+}
+
 /** @param {View | null} view @param {(en: Point) => Point} at */
 function places(view, at) {
   const children = [];
@@ -406,8 +441,7 @@ function places(view, at) {
     children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
   const land = (/** @type {string} */ name, /** @type {Point[]} */ ring, /** @type {string} */ kind) => {
-    const es = ring.map((p) => p[0]), ns = ring.map((p) => p[1]);
-    const [e, w, s, m] = [Math.max(...es), Math.min(...es), Math.min(...ns), Math.max(...ns)];
+    const [e, w, s, m] = extent(ring);
     const [x, y] = at([(e + w) / 2, (s + m) / 2]);
     // a name that its island has room for, and nothing else is written over
     if (Math.max(e - w, m - s) * camera.scale < 24 || taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - y) < 12)) return;
@@ -447,9 +481,9 @@ function vessels(view, at) {
 /** The other voyage at this moment. @param {(en: Point) => Point} at */
 function beside(at) {
   const other = state.other;
-  if (!other) { fill("other", []); return fill("ghost", []); }
-  const pieces = byTack(other.past.east_m.slice(0, other.count), other.past.north_m.slice(0, other.count), []);
-  fill("other", pieces.map((piece) => svg("path", { d: path(piece.points) })));
+  const isSame = isTracked("other", [other?.past, other?.count]);
+  if (!other) { if (!isSame) fill("other", []); return fill("ghost", []); }
+  if (!isSame) fill("other", byTack(other.past.east_m.slice(0, other.count), other.past.north_m.slice(0, other.count), []).map((piece) => svg("path", { d: path(piece.points) })));
   const n = other.count - 1, e = other.past.east_m[n], m = other.past.north_m[n];
   if (e == null || m == null) return fill("ghost", []);
   const [x, y] = at([e, m]);
