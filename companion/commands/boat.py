@@ -217,7 +217,10 @@ def _trial(args: argparse.Namespace) -> int:
     from companion.mission_check import check_mission
 
     mission = load_mission(args.mission)
-    out = args.mission.with_name(args.out or f"{args.mission.stem}-trial.toml")
+    out = Path(args.out or f"{args.mission.stem}-trial.toml")
+    out = args.mission.parent / out if out.parent == Path() else out
+    if out.parent.resolve() != args.mission.parent.resolve():  # what it names of the area is beside the mission
+        raise InputError("--out", "", f"{out} is not in the folder of {args.mission}", "name a file beside the mission")
     wind = mission.wind.preview_from_deg if args.from_deg is None else args.from_deg
     frame = mission.frame()
     tws_mps = mission.wind.preview_speed_mps

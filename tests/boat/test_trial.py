@@ -67,3 +67,19 @@ def test_a_mission_of_it_stands_beside_the_one_whose_water_it_takes(tmp_path, ca
     assert load_mission(tmp_path / "lake-trial.toml").wind.preview_from_deg == 240.0
     assert main(["boat", "trial", str(tmp_path / "archipelago.toml")]) == 1
     assert "no room" in capsys.readouterr().err
+
+
+def test_a_trial_of_another_folder_is_refused_and_one_named_by_the_missions_folder_is_written(tmp_path, capsys):
+    """It ended in a ValueError of with_name."""
+    for name in ("lake.toml", "lake.wkt"):
+        (tmp_path / name).write_bytes((Path("missions") / name).read_bytes())
+    (tmp_path / "elsewhere").mkdir()
+    lake = tmp_path / "lake.toml"
+    for out in (tmp_path / "elsewhere/t.toml", tmp_path):
+        assert main(["boat", "trial", str(lake), "--from-deg", "0", "--out", str(out)]) == 2
+        assert capsys.readouterr().err == (
+            f"companion boat: --out: {out} is not in the folder of {lake}; name a file beside the mission\n"
+        )
+    assert main(["boat", "trial", str(lake), "--from-deg", "0", "--out", str(tmp_path / "t.toml")]) == 0
+    assert main(["boat", "trial", str(lake), "--from-deg", "0", "--out", "u.toml"]) == 0
+    assert (tmp_path / "t.toml").read_bytes() == (tmp_path / "u.toml").read_bytes()
