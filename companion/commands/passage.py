@@ -408,7 +408,7 @@ def _read(
         lee_tws_mps=asked.limits.lee_tws_mps,
     )
     land = land_of(frame, _solids(asked, path), box, asked.area.margin_m)
-    for where, point in (("[start]", start), ("[goal]", goal)):
+    for where, point in (("[start]" if here is None else "--from", start), ("[goal]", goal)):
         if float(land.distance_m(frame.xy_from_geo([point.lat_deg], [point.lon_deg]))[0]) <= 0.0:
             raise InputError(
                 source, where, "is on land, in closed water or within [area] margin_m of it", "move it out to sea"

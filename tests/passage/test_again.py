@@ -116,6 +116,16 @@ def test_a_new_forecast_by_the_command(shell, tmp_path, capsys):  # noqa: F811
     assert (tmp_path / "n.toml").exists()
 
 
+def test_a_place_on_land_is_that_of_the_option(shell, tmp_path, capsys):  # noqa: F811
+    """It was told as the file's start, which is in open water."""
+    from companion import cli
+
+    assert shell("--out", "m.toml")[0] == 0
+    assert cli.main(["passage", "again", "p.toml", "m.toml", "--from", "50.0,-5.55"]) == 2
+    told = "p.toml: --from: is on land, in closed water or within [area] margin_m of it; move it out to sea\n"
+    assert told in capsys.readouterr().err
+
+
 def test_what_she_measured_corrects_the_first_hours(shell, tmp_path, capsys):  # noqa: F811
     """A forecast of 8 m/s from the north where she has 4 m/s: the way takes longer than it says."""
     from companion import cli
