@@ -119,6 +119,10 @@ def parse_passage(text: str, source: str) -> PassageFile:
         raw = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise not_toml(source, text, error) from None
+    if isinstance(raw.get("goal"), list):
+        raise InputError(
+            source, "", "is a mission, not a passage: it has [[goal]]", f"check it by: companion mission check {source}"
+        )
     for table, keys in raw.items():
         for key, value in keys.items() if isinstance(keys, dict) else ():
             if isinstance(value, float) and not math.isfinite(value):

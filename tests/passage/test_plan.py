@@ -261,6 +261,10 @@ def test_an_option_that_goes_with_another(shell, words, said):
         (("lat = 50.0", "lat = 95.0"), "p.toml: [start] lat: expected a number of at most 90.0"),
         (("lat = 50.0", "lat = nan"), "p.toml: [start] lat: nan is not a finite number"),
         (("files =", "file ="), "p.toml: [weather] file: unknown key; did you mean 'files'?"),
+        (
+            ("[goal]", "[[goal]]"),
+            "p.toml: is a mission, not a passage: it has [[goal]]; check it by: companion mission check p.toml",
+        ),
         (("[goal]", "[gaol]"), "p.toml: gaol: unknown key; did you mean 'goal'?"),
         (
             ('"rock.wkt"', '"rocks.wkt"'),
