@@ -187,6 +187,17 @@ def _again(args: argparse.Namespace) -> int:
     mission = load_mission(args.mission)
     points = [mission.start or mission.origin, *(goal.point for goal in mission.goals)]
     asked, passage = _read(args.file, None if args.now is None else args.now.timestamp(), args.here, forecasts, "--now")
+    last, end = passage.frame.xy_from_geo(
+        *zip(*((p.lat_deg, p.lon_deg) for p in (points[-1], passage.goal)), strict=True)
+    )
+    off_m = math.dist(last, end)
+    if off_m > passage.frame.length_m:  # a route that was sent in part ends before the goal, nearer to it than she is
+        raise InputError(
+            str(args.mission),
+            "[[goal]]",
+            f"the last one is {off_m / 1000.0:.0f} km from where {args.file} leads, farther than she is",
+            "name the mission that `companion passage plan --out` wrote of it",
+        )
     now = (args.now or asked.depart.at).timestamp()
     print(told_of_age(passage.weather, now))
     if args.measured is not None:

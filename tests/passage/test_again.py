@@ -126,6 +126,21 @@ def test_a_place_on_land_is_that_of_the_option(shell, tmp_path, capsys):  # noqa
     assert told in capsys.readouterr().err
 
 
+def test_a_mission_of_another_water_is_no_route_of_the_passage(shell, tmp_path, capsys):  # noqa: F811
+    """It was told as a route that leads over land, and a change from it was advised."""
+    from companion import cli
+
+    shell()
+    (tmp_path / "lake.toml").write_text("[[goal]]\nlat = 50.817\nlon = -1.31\n")
+    assert cli.main(["passage", "again", "p.toml", "lake.toml", "--from", "50.0,-5.9"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == (
+        "companion passage: lake.toml: [[goal]]: the last one is 278 km from where p.toml leads, farther than she is; "
+        "name the mission that `companion passage plan --out` wrote of it\n"
+    )
+
+
 def test_what_she_measured_corrects_the_first_hours(shell, tmp_path, capsys):  # noqa: F811
     """A forecast of 8 m/s from the north where she has 4 m/s: the way takes longer than it says."""
     from companion import cli
