@@ -326,7 +326,7 @@ def write_instance(
     Raises:
         InputError: it could not be sailed; nothing is written.
     """
-    from companion.disk import Disk
+    from companion.commands.output import write_files
     from companion.geofence import load_mission
     from companion.geofence.mission import load_settings, toml
 
@@ -344,8 +344,7 @@ def write_instance(
             raise InputError(
                 str(folder / Path(error.source).name), error.place, error.problem, error.remedy or "nothing is written"
             ) from None
-    for file, data in files.items():
-        Disk().replace(folder / file, data)
+    write_files({str(folder / file): data for file, data in files.items()}, force=True)
     return [folder / file for file in files]
 
 

@@ -1,5 +1,6 @@
 """``companion setup``: finds the autopilot on a serial port, writes two files, and says what is wrong."""
 
+import errno
 import fcntl
 import grp
 import os
@@ -15,6 +16,7 @@ import pytest
 
 from companion import cli
 from companion.commands import setup
+from companion.disk import Disk
 from companion.errors import LinkError
 from companion.geofence import load_mission
 from sitl.scenario.traffic import free_port
@@ -156,6 +158,25 @@ def test_a_full_card_is_one_line_with_what_makes_room(tmp_path, monkeypatch, cap
     err = capfd.readouterr().err
     assert "the card is full (0.0 MB left); make room: sudo apt clean" in err
     assert err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_takes_only_one_of_the_two_files_is_told_and_keeps_none(tmp_path, monkeypatch, capfd):
+    """It said "lake.env: Read-only file system" and no more, and left a mission that the next try would not replace."""
+    create = Disk.create
+
+    def refuse(disk, path):
+        if path.name.startswith("lake.env"):
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+        return create(disk, path)
+
+    monkeypatch.setattr(Disk, "create", refuse)
+    words = ["setup", "lake", "--yes", "--dir", str(tmp_path), "--link", "udpin:127.0.0.1:1", "--no-doctor", *HERE]
+    assert cli.main(words) == 2
+    assert capfd.readouterr().err == (
+        f"companion setup: {tmp_path}/lake.env: cannot be written (Read-only file system); what was there is there; "
+        "name another place\n"
+    )
     assert not list(tmp_path.iterdir())
 
 
