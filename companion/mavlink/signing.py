@@ -42,7 +42,7 @@ def read_key(path: Path) -> bytes:
     Raises:
         InputError: it is missing, readable by others, or empty.
     """
-    text = read_secret(path, "the signing key", "make it with mode 0600")
+    text = read_secret(path, "the signing key", f"check the path, or make one: companion key new {path}")
     if re.fullmatch(r"[0-9a-fA-F]{64}", text):
         return bytes.fromhex(text)
     if not text:

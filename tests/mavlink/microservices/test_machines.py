@@ -286,7 +286,7 @@ def test_the_signing_clock_never_goes_back(tmp_path):
 
 def test_keys_that_are_open_empty_or_missing_are_refused(tmp_path):
     key = tmp_path / "key"
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match=f"no such file; check the path, or make one: companion key new {key}"):
         read_key(key)
     key.write_text("ab" * 32)
     key.chmod(0o644)
