@@ -170,9 +170,8 @@ def _learn(args: argparse.Namespace) -> int:
         for note in one.log.notes:
             print(f"{one.log.name}: {note}")
     if not read:
-        raise JobError(
-            f"none of {counted(len(paths), 'log')} can be learned from" if paths else "there is no log in there"
-        )
+        none = f"{', '.join(map(str, args.logs))}: no log is in there; give voyage folders, .tlog, .BIN, CSV or NMEA"
+        raise JobError(f"none of {counted(len(paths), 'log')} can be learned from" if paths else none)
     print(f"learning from {counted(len(read), 'log')}", file=sys.stderr)
     try:
         lesson = lesson_of(

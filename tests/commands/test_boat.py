@@ -96,6 +96,16 @@ def season(folder, days=2):
     return folder
 
 
+def test_a_folder_without_logs_is_named(tmp_path, capsys):
+    """ "there is no log in there" was all that was said."""
+    guess, logs = tmp_path / "pepper.toml", tmp_path / "logs"
+    assert main(["boat", "guess", *SIZES, "--out", str(guess)]) == 0
+    logs.mkdir()
+    assert main(["boat", "learn", str(logs), "--from", str(guess), "--out", str(tmp_path / "p2.toml")]) == 1
+    told = f"companion boat: {logs}: no log is in there; give voyage folders, .tlog, .BIN, CSV or NMEA\n"
+    assert capsys.readouterr().err == told
+
+
 def test_a_boat_is_learned_from_its_logs_and_sailed_by_a_mission(tmp_path, capsys):
     guess, out = tmp_path / "pepper.toml", tmp_path / "learned.toml"
     assert main(["boat", "guess", *SIZES, "--out", str(guess)]) == 0
