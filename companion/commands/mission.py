@@ -141,7 +141,8 @@ def _check(args: argparse.Namespace) -> int:
     from companion.compose import field_words
     from companion.mission_check import check_mission, current_words_of, tide_words_of, wind_limit_words
 
-    with patience("checking", "to fit an area of many positions into the autopilot's fence takes long"):
+    why = "an area of many positions takes long, and the first time on a machine kernels are compiled"
+    with patience("checking", why):
         judged = check_mission(Path(args.file), from_deg=args.wind[1] if args.wind else None, unix_s=time.time())
     if judged.mission is None or judged.refusals:
         raise judged.refusals[0]
