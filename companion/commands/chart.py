@@ -167,7 +167,7 @@ def _import(args: argparse.Namespace) -> int:
     from companion.geofence import Charted
 
     center, reach_m, places, options = _water(args)
-    out = args.out or (Path(args.mission).stem + "-chart" if args.mission else "chart")
+    out = (args.out or "").removesuffix(".geojson") or (Path(args.mission).stem + "-chart" if args.mission else "chart")
     folder = Path(args.mission).parent if args.mission and not args.out else Path()
     obstacles, fence = folder / f"{out}.geojson", folder / f"{out}-fence.geojson"
     drying = folder / f"{out}-drying.geojson"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import datetime as dt
 import math
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.disk import reason
+from companion.disk import Disk, reason
 from companion.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,11 +21,18 @@ DPI = 110
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Write a figure and close it. Raises InputError when the file cannot be written or its kind is unknown."""
+    """Write a figure whole, a .png where nothing else is said, and close it.
+
+    Raises:
+        InputError: the file cannot be written, and what was there is there; or its kind is unknown.
+    """
     import matplotlib.pyplot as plt
 
+    path = Path(path) if Path(path).suffix else Path(path).with_suffix(".png")
+    drawn = BytesIO()
     try:
-        figure.savefig(path, dpi=DPI)
+        figure.savefig(drawn, dpi=DPI, format=path.suffix[1:])
+        Disk().replace(path, drawn.getvalue(), is_durable=False)
     except (OSError, ValueError) as error:
         why = reason(error) if isinstance(error, OSError) else str(error)
         raise InputError(str(path), "", f"cannot be written ({why})", "name a .png elsewhere") from None

@@ -88,6 +88,14 @@ def test_a_coast_becomes_the_area_of_a_mission_and_needs_no_extra(shell, monkeyp
     assert "m-chart.geojson: exists; say --force" in err
 
 
+@pytest.mark.parametrize("out", ["bay", "bay.geojson"])
+def test_the_areas_files_are_named_by_out_with_or_without_its_ending(shell, out):
+    (shell.folder / "coast.geojson").write_text(collection((ISLAND, {})))
+    (shell.folder / "m.toml").write_text(MISSION)
+    assert shell("coast.geojson", "--mission", "m.toml", "--out", out)[0] == 0
+    assert {p.name for p in shell.folder.glob("bay*")} == {"bay.geojson", "bay-fence.geojson"}
+
+
 def test_the_keel_of_the_mission_says_what_is_too_shallow(shell):
     row = "-9 -9 -9 -9 -9\n"
     header = "ncols 5\nnrows 5\nxllcorner -1.33\nyllcorner 50.80\ncellsize 0.01\n"

@@ -268,6 +268,10 @@ def test_a_picture_or_track_that_cannot_be_written_is_named_with_what_would_do(v
     with pytest.raises(InputError) as refused:
         save(figure, tmp_path / "gone" / "x.png")
     assert str(refused.value).endswith("x.png: cannot be written (No such file or directory); name a .png elsewhere")
+    with pytest.raises(InputError, match=r"x\.bmpx: cannot be written \(Format 'bmpx' is not supported"):
+        save(plt.figure(), tmp_path / "x.bmpx")
+    save(plt.figure(), tmp_path / "x")
+    assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
     assert cli.main(["report", str(voyage), "--track", str(tmp_path / "day.wkt")]) == 2
     assert capsys.readouterr().err.strip().endswith("use .gpx, .kml, .kmz, .geojson")
 
@@ -341,3 +345,18 @@ def test_a_device_that_is_named_is_written_to_and_stays():
     with pytest.raises(InputError, match=r"^/dev/full: cannot be written \(No space left on device\)"):
         write_files({"/dev/full": b"x"}, force=True)
     assert Path("/dev/full").is_char_device()
+
+
+def test_a_picture_that_has_no_room_leaves_the_one_that_was_there(tmp_path, monkeypatch):
+    """On a full card a good picture became one of no bytes."""
+    there = tmp_path / "x.png"
+    there.write_bytes(b"good")
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Disk, "_write", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        save(plt.figure(), there)
+    assert there.read_bytes() == b"good"
+    assert [p.name for p in tmp_path.iterdir()] == ["x.png"]
