@@ -31,7 +31,6 @@ from companion.geofence.area import Area, buffer_out, parts
 from companion.geofence.document import FindingLevel
 from companion.geofence.formats.fence_items import (
     MAX_FENCE_ITEMS,
-    MAX_RING,
     STORAGE_BYTES,
     items_to_zones,
     storage_bytes,
@@ -583,7 +582,7 @@ def _near(solids: list[_Solid], way: BaseGeometry, reach_m: float) -> tuple[list
 def _too_many(zones: Sequence[Zone], items: Sequence[MissionItem], used_m: float, margin_m: float) -> str:
     """Return why the autopilot has no room for the items; "" where it has."""
     stored = storage_bytes(items)
-    if len(items) <= MAX_FENCE_ITEMS and stored <= STORAGE_BYTES and all(_sides(z) <= MAX_RING for z in zones):
+    if len(items) <= MAX_FENCE_ITEMS and stored <= STORAGE_BYTES:
         return ""
     worst = sorted(((_sides(z), z.name or z.kind.value) for z in zones), reverse=True)[:3]
     return (
@@ -626,7 +625,7 @@ def _solids(
 
 
 def _island(ring: BaseGeometry, plane: Plane, index: int) -> Obstacle:
-    lonlat = plane.degrees(np.asarray(ring.coords)[:, :2])
+    lonlat = plane.degrees(np.asarray(ring.coords))
     return Obstacle(shape=Polygon(lonlat), name=f"hole {index + 1} of the fence")
 
 

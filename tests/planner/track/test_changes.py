@@ -136,9 +136,10 @@ def test_the_speed_at_a_bow_is_that_of_the_course_it_makes():
 
 
 def test_a_beat_with_a_leg_before_it_is_judged_by_its_own_boards():
-    path = [(0.0, 0.0), (0.0, 90.0)]
+    path, sure = [(0.0, 0.0), (0.0, 298.0)], {"from_deg": 0.0, "speed_mps": 5.0, "sigma": {"model": "none"}}
     from_rest, rounding = (
-        expected(channel(18.0, tracking=tracking), path) for tracking in ({}, {"before": {"x": 0.0, "y": -40.0}})
+        expected(channel(14.0, wind=sure, tracking=tracking), path)
+        for tracking in ({}, {"before": {"x": 0.0, "y": -40.0}})
     )
     assert (rounding.is_beat, rounding.is_kept, rounding.worst_leg) == (True, False, 0)
     assert rounding.clearance_m == pytest.approx(from_rest.clearance_m, abs=1.0)
