@@ -21,7 +21,6 @@ from companion.messages import Command, GeoPoint, MissionItem, float32
 
 MAX_FENCE_ITEMS = 84  # ArduRover 4.7: "Only 84 items are supported" (672 bytes of storage, 8 a piece)
 STORAGE_BYTES = 672  # ... and "Fence exceeds storage size": see ``storage_bytes``
-MAX_RING = 255  # vertices of one polygon
 
 _VERTEX = {
     Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION: ZoneKind.INCLUSION,
