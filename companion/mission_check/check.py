@@ -21,10 +21,12 @@ from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
 from companion.skipper.planning import LACK_M, TRACKS_M
+from companion.skipper.step import SkipperConfig
 from companion.skipper.way import KEEP_SHARE, SAME_M, Gate, Side
 
 HAIR_M = 0.005  # a depth is written in centimetres
 LEAST_NO_GO_DEG = 20.0  # an ice boat's
+LOITER_M = SkipperConfig().loiter_radius_m  # the least that she reckons with
 WINDS_MPS = range(1, 13)  # in which a loiter is looked at: no gale is ordinary weather
 SMALL_M = 3.0  # a fix is good to 2.5 m
 
@@ -288,13 +290,15 @@ def _boxes(mission: Mission) -> Iterator[Finding]:
         if goal.box is None:
             continue
         has_m = float(voyage.area.clearance_m([goal.en_m])[0])
-        winds = [tws for tws in WINDS_MPS if loiter_swing_m(voyage.boat.polar, tws) + floor_m - LACK_M > has_m]
+        swings = [max(LOITER_M, round(loiter_swing_m(voyage.boat.polar, tws))) for tws in WINDS_MPS]
+        winds = [tws for tws, swing_m in zip(WINDS_MPS, swings, strict=True) if swing_m + floor_m - LACK_M > has_m]
         if winds:
+            strong = "any wind" if winds[0] == WINDS_MPS[0] else f"{winds[0]} m/s of wind and more"
             yield Finding(
                 severity=FindingLevel.WARNING,
                 code=Code.SMALL,
                 place=f"[[goal]] {number} polygon",
-                text=f"the roomiest place in it has {has_m:.0f} m about it: in {winds[0]} m/s of wind and more a "
+                text=f"the roomiest place in it has {has_m:.0f} m about it: in {strong} a "
                 f"loiter comes below the margin's floor of {floor_m:g} m there, and she gives the box up, or leaves it",
                 remedy="choose a box with more room about it, or let [area] margin_floor_m be smaller",
             )
