@@ -20,8 +20,8 @@ from companion.geofence.mission import place_troubles, read_mission
 from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
+from companion.skipper import SkipperConfig
 from companion.skipper.planning import LACK_M, TRACKS_M
-from companion.skipper.step import SkipperConfig
 from companion.skipper.way import KEEP_SHARE, SAME_M, Gate, Side
 
 HAIR_M = 0.005  # a depth is written in centimetres
