@@ -43,8 +43,10 @@ from companion.messages import WindForecast
 #     g = (n(θ) / W + n(φ) / v, 0, -s, 1 + v cos β / W, -(1 + v cos β / W)),    n(a) = (cos a, -sin a)           (a)
 #
 # since the autopilot's wind over ground is its apparent wind, longer by v cos β on a beat at β, less its velocity. The
-# mean is left where it is measured, for by that wind the autopilot decides what it beats: what is believed of the
-# errors is part of the spread, as what is not known of them is.
+# wind's mean is left where it is measured, for by that wind the autopilot decides what it beats. What is believed to
+# bring the bow nearer to the wind on both tacks alike (leeway, a current down the wind; which of them is all one here)
+# is a wider zone. The rest of what is believed, nearer on one tack and farther on the other, is part of the spread, as
+# what is not known is.
 
 UNTOLD_MPS = 0.15  # [m/s] of a current that is not planned for: of a stronger one the boat's own track soon tells
 SLOW_MPS = 0.5  # [m/s] the least speed that a crab angle is reckoned with
@@ -75,37 +77,67 @@ class WindAngleUncertainty:
         ``leeway_rad`` is the leeway that the plan has there. Of a current that is not planned for, ``UNTOLD_MPS`` at
         most. Half widths grow as the direction's sigma does.
         """
-        moment = self._moment(leeway_rad)
-        from_rad, wind_mps = forecast.mean_twd_from_rad, np.maximum(forecast.mean_tws_mps, LEAST_MPS)
-        speed_mps = max(speed_mps, SLOW_MPS)
-        turned = _abeam(from_rad) / wind_mps[:, None]
-        more = np.zeros_like(from_rad)
-        for side in (1.0, -1.0):
-            g = np.zeros((from_rad.shape[0], 6))  # (a)
-            g[:, :2] = turned + _abeam(from_rad - side * beat_rad) / speed_mps
-            g[:, 3] = -side
-            g[:, 4] = 1.0 + speed_mps * math.cos(beat_rad) / wind_mps
-            g[:, 5] = -g[:, 4]
-            more = np.maximum(more, np.einsum("ni,ij,nj->n", g, moment, g))
+        off, covariance = self._unplanned(leeway_rad)
+        starboard, port = _forms(forecast, beat_rad, speed_mps)
+        nearer = 0.5 * (port - starboard) @ off
+        more = np.maximum(
+            np.einsum("ni,ij,nj->n", starboard, covariance, starboard) + (starboard @ off + nearer) ** 2,
+            np.einsum("ni,ij,nj->n", port, covariance, port) + (port @ off - nearer) ** 2,
+        )
         if self.is_planned:  # the wind over the water has its own doubt already (``forecast_over_water``)
-            more = np.maximum(more - np.einsum("ni,ij,nj->n", turned, moment[:2, :2], turned), 0.0)
+            turned = _turned(forecast)
+            more = np.maximum(more - np.einsum("ni,ij,nj->n", turned, covariance[:2, :2], turned), 0.0)
         sigma = np.minimum(np.sqrt(forecast.sigma_twd_rad**2 + more), math.pi)
         factor = sigma / np.maximum(forecast.sigma_twd_rad, 1e-9)
         return replace(
             forecast, sigma_twd_rad=sigma, half_width_rad=np.minimum(forecast.half_width_rad * factor[:, None], math.pi)
         )
 
-    def _moment(self, leeway_rad: float) -> NDArray[np.float64]:
-        """Return the mean squares and products of what plans do not reckon with."""
+    def nearer_rad(
+        self, forecast: WindForecast, *, beat_rad: float, speed_mps: float, leeway_rad: float = 0.0
+    ) -> float:
+        """Return how much nearer to the wind the bow is believed to be than a plan has it, on either tack [rad, >= 0].
+
+        The arguments are those of ``widened``. A bow that is believed to be farther from the wind on both is none.
+        """
+        off, _ = self._unplanned(leeway_rad)
+        starboard, port = _forms(forecast, beat_rad, speed_mps)
+        return max(0.0, float(0.5 * (port[0] - starboard[0]) @ off))
+
+    def _unplanned(self, leeway_rad: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return what is believed and plans do not reckon with, (6,), and its covariance, (6, 6)."""
         off, covariance = np.array(self.believed), np.array(self.covariance)
         off[3] -= leeway_rad
         if self.is_planned:
             off[:2] = 0.0
-            return np.asarray(covariance + np.outer(off, off))
-        moment = covariance + np.outer(off, off)
-        most = math.sqrt(max(float(np.linalg.eigvalsh(moment[:2, :2])[1]), 1e-12))
+            return off, covariance
+        moment = covariance[:2, :2] + np.outer(off[:2], off[:2])
+        most = math.sqrt(max(float(np.linalg.eigvalsh(moment)[1]), 1e-12))
         shrunk = np.array([min(1.0, UNTOLD_MPS / most)] * 2 + [1.0] * 4)
-        return np.asarray(moment * np.outer(shrunk, shrunk))
+        return off * shrunk, covariance * np.outer(shrunk, shrunk)
+
+
+def _forms(
+    forecast: WindForecast, beat_rad: float, speed_mps: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the linear forms g of (a) for a beat on starboard tack and on port, (n, 6) each."""
+    from_rad, wind_mps = forecast.mean_twd_from_rad, np.maximum(forecast.mean_tws_mps, LEAST_MPS)
+    speed_mps = max(speed_mps, SLOW_MPS)
+    forms = []
+    for side in (1.0, -1.0):
+        g = np.zeros((from_rad.shape[0], 6))
+        g[:, :2] = _turned(forecast) + _abeam(from_rad - side * beat_rad) / speed_mps
+        g[:, 3] = -side
+        g[:, 4] = 1.0 + speed_mps * math.cos(beat_rad) / wind_mps
+        g[:, 5] = -g[:, 4]
+        forms.append(g)
+    return forms[0], forms[1]
+
+
+def _turned(forecast: WindForecast) -> NDArray[np.float64]:
+    """Return how a current turns the wind over the water [rad per m/s], (n, 2)."""
+    wind_mps = np.maximum(forecast.mean_tws_mps, LEAST_MPS)
+    return np.asarray(_abeam(forecast.mean_twd_from_rad) / wind_mps[:, None])
 
 
 def _abeam(of_rad: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -517,8 +517,8 @@ def no_go_of(step: Step, voyage: Voyage, config: SkipperConfig) -> values.NoGo |
         return None
     delta_s = config.delta_s if route is None else route.delta_s
     boat, bow_rad = voyage.boat, config.planned_no_go_rad(voyage.boat, step.snapshot.limits)
-    forecast = planned_forecast(boat, forecast, bow_rad, step.snapshot.doubt)
-    half_rad = boat.made_good_rad(bow_rad, float(forecast.mean_tws_mps[0]))
+    forecast, nearer_rad = planned_forecast(boat, forecast, bow_rad, step.snapshot.doubt)
+    half_rad = boat.made_good_rad(bow_rad, float(forecast.mean_tws_mps[0])) + nearer_rad
     wedges = []
     for at_s in WEDGES_S:
         if at_s <= float(forecast.horizon_s[-1]):

@@ -126,24 +126,35 @@ def legs_promised(folder: Path, sailed: list[SailedSpan], half_rad: float) -> li
     """Return of each sailed leg that a plan of the record holds: its promise, what came, whose its tacks were.
 
     ``off_deg`` is how far the wind's angle to the bow was from the planned one, positive to starboard; ``sigma_deg``
-    how far it was expected to be; ``course_off_deg`` how far the leg's own course was from the planned one.
+    how far it was expected to be; ``course_off_deg`` how far the leg's own course was from the planned one. Legs are
+    of courses: the bow is nearer to the wind by the leeway that the plan was asked with.
     """
-    plans = [(d["t_s"], d["plan"]["legs"]) for d in decisions(folder) if d["kind"] == "plan" and d.get("plan")]
+    leeway_rad = {
+        d["request_id"]: math.radians(d.get("leeway_deg", 0.0))
+        for d in decisions(folder)
+        if d.get("action") == "RequestPlan"
+    }
+    plans = [
+        (d["t_s"], d["plan"]["legs"], leeway_rad.get(d.get("request_id"), 0.0))
+        for d in decisions(folder)
+        if d["kind"] == "plan" and d.get("plan")
+    ]
     found = []
     for leg in sailed:
-        planned = next(
+        planned, slip_rad = next(
             (
-                p
-                for t_s, legs in reversed(plans)
+                (p, slip_rad)
+                for t_s, legs, slip_rad in reversed(plans)
                 if t_s <= leg.t_s
                 for p in legs
                 if math.dist(p["to"], leg.end_en_m) <= _SAME_M
             ),
-            None,
+            (None, 0.0),
         )
         if planned is None:
             continue
-        twa_rad, sigma_rad = math.radians(planned["twa_deg"]), math.radians(planned["sigma_deg"])
+        course_twa_rad, sigma_rad = math.radians(planned["twa_deg"]), math.radians(planned["sigma_deg"])
+        twa_rad = math.copysign(max(0.0, abs(course_twa_rad) - slip_rad), course_twa_rad)
         came_rad = wrap_pi(leg.twd_from_rad - leg.bow_rad)
         planned_rad = heading_of(planned["to"][0] - planned["from"][0], planned["to"][1] - planned["from"][1])
         found.append(

@@ -68,6 +68,20 @@ def test_the_spread_is_that_of_drawn_boats(from_rad, tws, speed, seed):
     assert float(made.sigma_twd_rad[0]) == pytest.approx(max(spreads), rel=0.08)
 
 
+@settings(max_examples=20)
+@given(st.floats(-3.0, 3.0), st.floats(4.0, 9.0), st.floats(1.5, 3.0), st.floats(-0.05, 0.05), st.floats(-0.08, 0.08))
+def test_what_brings_the_bow_nearer_on_both_tacks_is_told_apart(from_rad, tws, speed, down_mps, leeway_rad):
+    down = -down_mps * math.sin(from_rad), -down_mps * math.cos(from_rad)  # from where the wind is from
+    believed = (*down, 0.0, leeway_rad, 0.02, -0.03)
+    told = doubt((1e-9,) * 6, believed)
+    nearer = [BEAT_RAD - side * angle_rad(from_rad, tws, speed, side, believed) for side in (1.0, -1.0)]
+    air = forecast(from_rad, tws, 1e-6)
+    found = told.nearer_rad(air, beat_rad=BEAT_RAD, speed_mps=speed)
+    assert found == pytest.approx(max(0.0, sum(nearer) / 2.0), abs=0.01)
+    rest = float(told.widened(air, beat_rad=BEAT_RAD, speed_mps=speed).sigma_twd_rad[0])
+    assert rest == pytest.approx(abs(nearer[0] - nearer[1]) / 2.0, abs=0.01), "not spread as well"
+
+
 def test_half_widths_grow_with_it_and_the_mean_stays():
     plain = forecast(0.3, 5.0)
     made = doubt((0.05, 0.05, 0.1, 0.04, 0.04, 0.07)).widened(plain, beat_rad=BEAT_RAD, speed_mps=2.0)

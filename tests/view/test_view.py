@@ -452,6 +452,11 @@ def test_the_no_go_zone_has_what_plans_allow_for(tmp_path):
         wedges[name] = [w.widening_deg for w in zone.wedges]
     assert wedges["sure"] == pytest.approx([1.6449 * math.hypot(sigma, 4.0) for sigma in (2.0, 6.0, 12.0)], abs=0.03)
     assert all(a > b + 0.5 for a, b in zip(wedges["vane"], wedges["sure"], strict=True))
+    more = replace(sure, believed=(0.0, 0.0, 0.0, slips_rad + math.radians(3.0), 0.0, 0.0))  # than her file tells of
+    told = replace(step, snapshot=replace(step.snapshot, doubt=more))
+    zone = no_go_of(told, replace(voyage, boat=boat), config)
+    assert zone.half_deg == pytest.approx(made + 3.0, abs=0.02)
+    assert [w.widening_deg for w in zone.wedges] == pytest.approx(wedges["sure"], abs=0.02)
 
 
 def test_a_motor_boat_is_shown_no_no_go_zone_and_no_laylines(voyage):

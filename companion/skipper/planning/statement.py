@@ -127,20 +127,25 @@ def wind_part(
 
 def planned_forecast(
     boat: Boat, forecast: WindForecast, half_rad: float, doubt: WindAngleUncertainty | None
-) -> WindForecast:
-    """Return the forecast by which plans widen the no-go zone: with what the sensors and the boat's file may err.
+) -> tuple[WindForecast, float]:
+    """Return the forecast by which plans widen the no-go zone, and how much wider than the boat's it is without [rad].
 
+    The forecast has what the sensors and the boat's file may err by. The second is what the boat has shown of the
+    wind's angle to her bow: by so much more than her leeway it is less than that to her course, on either tack.
     ``half_rad`` is the bow's angle to the wind that is kept out of; ``doubt``: of the wind's angle on a leg.
     """
-    speed = float(np.max(forecast.mean_tws_mps))
+    speed, nearer_rad = float(np.max(forecast.mean_tws_mps)), 0.0
     if doubt is not None:
-        forecast = doubt.widened(
-            forecast,
-            beat_rad=half_rad,
-            speed_mps=boat.polar.speed_mps(half_rad, speed),
-            leeway_rad=boat.made_good_rad(half_rad, speed) - half_rad,
-        )
-    return with_no_go_error(forecast, boat.no_go_error_rad) if boat.no_go_error_rad > 0.0 else forecast
+        on_a_beat = {
+            "beat_rad": half_rad,
+            "speed_mps": boat.polar.speed_mps(half_rad, speed),
+            "leeway_rad": boat.made_good_rad(half_rad, speed) - half_rad,
+        }
+        nearer_rad = doubt.nearer_rad(forecast, **on_a_beat)
+        forecast = doubt.widened(forecast, **on_a_beat)
+    if boat.no_go_error_rad > 0.0:
+        forecast = with_no_go_error(forecast, boat.no_go_error_rad)
+    return forecast, nearer_rad
 
 
 def with_no_go_error(forecast: WindForecast, error_rad: float) -> WindForecast:
@@ -389,7 +394,7 @@ def problem_dict(
     speed = float(np.max(forecast.mean_tws_mps))
     length_s = 1.5 * distance_m(start.en_m, aim.en_m) / max(0.3, voyage.boat.polar.max_speed_mps(speed))
     half_rad = max(no_go_half_rad, voyage.boat.no_go_half_rad)
-    forecast = planned_forecast(voyage.boat, forecast, half_rad, doubt)
+    forecast, nearer_rad = planned_forecast(voyage.boat, forecast, half_rad, doubt)
     wind = wind_part(forecast, after_s=start.after_s, length_s=length_s, delta_s=delta_s, is_known=is_wind_known)
     water: dict[str, Any] = {}
     if current.is_significant:
@@ -411,9 +416,10 @@ def problem_dict(
     boat["speed_error"] = min(math.hypot(voyage.boat.speed_error / (1.0 + seen.tries), seen.error), 1.0)
     if not current.is_significant and failing and failing["tack_fails"] > 0.0:
         water["adrift"] = {"set_deg": math.degrees(current.set_rad), "drift_mps": current.drift_mps}
-    boat["no_go_half_deg"] = math.degrees(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]))
-    if "leeway_deg" in boat:
-        boat["leeway_deg"] = boat["no_go_half_deg"] - math.degrees(half_rad)
+    course_rad = min(voyage.boat.made_good_rad(half_rad, wind["speed_mps"]) + nearer_rad, voyage.boat.max_twa_rad)
+    boat["no_go_half_deg"] = math.degrees(course_rad)
+    if course_rad > half_rad:
+        boat["leeway_deg"] = math.degrees(course_rad - half_rad)
     return {
         "id": voyage.name,
         "title": title,

@@ -65,6 +65,7 @@ def action_record(action: Action, snapshot: Snapshot, config: SkipperConfig) -> 
             "delta_s": problem.delta_s,
             "twd_deg": math.degrees(wrap_two_pi(problem.wind.twd_from_rad)),
             "tws_mps": problem.wind.tws_mps,
+            "leeway_deg": math.degrees(problem.boat.leeway_rad),
             "widening": [[t, math.degrees(problem.no_go_half_rad(t))] for t in WIDENING_S],
             "cross_track_m": snapshot.autopilot.cross_track_m if snapshot.autopilot else None,
             "margin_m": config.margin_m,

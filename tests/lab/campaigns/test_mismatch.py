@@ -189,11 +189,14 @@ def test_a_chance_is_one_and_grows_towards_the_wind(twa, sigma):
 
 
 def test_a_leg_is_held_against_the_newest_plan_that_has_it(tmp_path):
-    def plan(t_s, twa_deg):
+    def plan(t_s, twa_deg, number=1):
         leg = {"from": [0.0, 0.0], "to": [100.0, 0.0], "twa_deg": twa_deg, "sigma_deg": 10.0}
-        return json.dumps({"t_s": t_s, "kind": "plan", "plan": {"cost_s": 90.0 + t_s, "legs": [leg]}}) + "\n"
+        made = {"t_s": t_s, "kind": "plan", "request_id": number, "plan": {"cost_s": 90.0 + t_s, "legs": [leg]}}
+        return json.dumps(made) + "\n"
 
-    (tmp_path / "decisions.jsonl").write_text(plan(1.0, 60.0) + plan(50.0, 45.0) + '{"t_s": 60, "ki')
+    asked = {"t_s": 1.0, "kind": "action", "action": "RequestPlan", "request_id": 7, "leeway_deg": 5.0}
+    lines = plan(1.0, 60.0) + json.dumps(asked) + "\n" + plan(50.0, 50.0, 7)
+    (tmp_path / "decisions.jsonl").write_text(lines + '{"t_s": 60, "ki')
     sailed = [
         SailedSpan(t_s=t, end_en_m=end, course_rad=course, bow_rad=math.pi / 2.0, twd_from_rad=twd)
         for t, end, course, twd in (
@@ -205,7 +208,7 @@ def test_a_leg_is_held_against_the_newest_plan_that_has_it(tmp_path):
     found = legs_promised(tmp_path, sailed, math.radians(45.0))
     assert [leg["came"] for leg in found] == [False, True]
     assert found[0]["promised"] == pytest.approx(0.0668, abs=1e-3)  # 1.5 sigma off
-    assert found[1]["promised"] == pytest.approx(0.5, abs=1e-3)
+    assert found[1]["promised"] == pytest.approx(0.5, abs=1e-3)  # a course at 50 degrees, 5 of them leeway
     assert [leg["course_off_deg"] for leg in found] == [0.0, pytest.approx(math.degrees(1.0) - 90.0, abs=0.01)]
     assert found[1]["off_deg"] == pytest.approx(math.degrees(1.2 - math.pi / 2.0) - 45.0, abs=0.01)
     assert promised_s(tmp_path) == 91.0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from companion.compose import boat_of
+from companion.current import WindAngleUncertainty
 from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, leg_problem
 from companion.planner import Problem, plan
@@ -20,7 +21,7 @@ DELTA_S = 0.9
 Z = NormalDist().inv_cdf(DELTA_S)
 
 
-def stated(error_deg, sigma_deg=3.0):
+def stated(error_deg, sigma_deg=3.0, doubt=None):
     """Return the problem of a beat for a boat whose no-go zone is known to ``error_deg``."""
     made = voyage(Goal(en_m=(0.0, 500.0), radius_m=10.0))
     made = replace(made, boat=replace(made.boat, no_go_error_rad=math.radians(error_deg)))
@@ -34,7 +35,17 @@ def stated(error_deg, sigma_deg=3.0):
         margin_m=15.0,
         delta_s=DELTA_S,
         no_go_half_rad=math.radians(47.0),
+        doubt=doubt,
     )
+
+
+@pytest.mark.parametrize(("slip_deg", "half_deg"), [(0.0, 47.0), (4.0, 51.0), (-4.0, 47.0)])
+def test_leeway_that_the_boat_has_shown_is_a_wider_zone_and_no_spread(slip_deg, half_deg):
+    believed = (0.0, 0.0, 0.0, math.radians(slip_deg), 0.0, 0.0)
+    shown = stated(0.0, doubt=WindAngleUncertainty(believed=believed, covariance=((0.0,) * 6,) * 6))
+    assert shown["boat"]["no_go_half_deg"] == pytest.approx(half_deg)
+    assert shown["boat"].get("leeway_deg", 0.0) == pytest.approx(half_deg - 47.0)
+    assert shown["wind"] == stated(0.0)["wind"]
 
 
 def test_the_zone_widens_by_the_squares_of_both():
