@@ -153,7 +153,7 @@ def count_time(ctx: StepContext) -> None:
 def locate(ctx: StepContext) -> None:
     """Say where the boat is on its route: the autopilot's count, our own count, gates passed, way made good."""
     state, status = ctx.state, ctx.autopilot
-    route = state.mission.route
+    route, had_way = state.mission.route, bool(ctx.ahead())
     if ctx.gate is not None and ctx.boat_en is not None:
         ctx.set(
             progress=changed(
@@ -186,6 +186,9 @@ def locate(ctx: StepContext) -> None:
             if done and done[-1] > ctx.state.mission.index:
                 ctx.set(mission=changed(ctx.state.mission, index=done[-1], own_index=done[-1]))
         _remember(ctx)
+    if had_way and not ctx.ahead():
+        # What was tried from its last waypoint says nothing of a plan from the boat, nor is there time for patience.
+        ctx.set(plans=changed(ctx.state.plans, retry=PATIENT))
 
 
 def remember_fix(ctx: StepContext) -> None:

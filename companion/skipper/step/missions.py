@@ -62,6 +62,7 @@ RINGS_M = (0.0, 15.0, 30.0, 50.0, 80.0, 120.0)
 # Where nothing nearer is free at all: in the middle of a flat that dries.
 FAR_RINGS_M = (180.0, 270.0, 400.0, 600.0, 900.0)
 DIRECTIONS = 16
+SWINGS_RAD = math.radians(15.0)  # so far off the no-go zone a line may be closed by the time that it is sailed
 ROOMIER_M = 50.0  # a place with the room that is wanted is worth sailing this far
 ROOMIER_BY_M = 3.0  # ... and a somewhat roomier one only for this much of room
 
@@ -111,9 +112,10 @@ def _roomy_place(
         for n in range(count):
             place = moved(end_en, 2.0 * math.pi * n / DIRECTIONS, ring_m)
             if ring_m > 0.0:
-                closed = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place))) < config.no_go_half_rad
-                needed_m = floor_m + (corridor_m if closed else 0.0)
-                if _line_clearance_m(water, end_en, place) < needed_m or _meets_mark(marks, end_en, place):
+                twa_rad = abs(difference_rad(twd_from_rad, bearing_rad(end_en, place)))
+                needed_m = floor_m + (corridor_m if twa_rad < config.no_go_half_rad else 0.0)
+                beaten_m = corridor_m if twa_rad < config.no_go_half_rad + SWINGS_RAD else 0.0
+                if _line_clearance_m(water, end_en, place) < needed_m or _meets_mark(marks, end_en, place, beaten_m):
                     continue
             room = float(_rooms_m(voyage, config, marks, [place], leeward)[0])
             if room >= max(config.loiter_radius_m, wanted_m):
@@ -187,10 +189,15 @@ def _off_marks_m(marks: Sequence[Mark], places: Sequence[PointEn]) -> NDArray[np
     return np.array([min(row, default=math.inf) for row in off])
 
 
-def _meets_mark(marks: Sequence[Mark], from_en: PointEn, to_en: PointEn) -> bool:
-    """Return whether a straight line leads nearer to a mark than plans go, and than it begins."""
+def _meets_mark(marks: Sequence[Mark], from_en: PointEn, to_en: PointEn, beaten_m: float) -> bool:
+    """Return whether a straight line leads nearer to a mark than plans go, and than it begins.
+
+    About one that is or may be beaten, ``beaten_m`` to either side, a mark beside its begin is as near as one ahead.
+    """
     return any(
-        leg_distance_m(mark.en_m, from_en, to_en) < min(mark.keep_m, distance_m(mark.en_m, from_en)) for mark in marks
+        leg_distance_m(mark.en_m, from_en, to_en)
+        < (mark.keep_m + beaten_m if beaten_m > 0.0 else min(mark.keep_m, distance_m(mark.en_m, from_en)))
+        for mark in marks
     )
 
 

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely.geometry import LineString, Point, box
 
+from companion.geo.angles import difference_rad
 from companion.messages import Command, MissionItem, sailed_part
 from companion.skipper.step.config import SafeEnd, SkipperConfig
 from companion.skipper.step.missions import (
@@ -147,6 +148,18 @@ def test_from_below_the_floor_a_loiter_is_found_away_from_what_is_near():
     inside, room = loiter_place(made, CONFIG, (0.0, 103.0), math.pi)
     assert room >= CONFIG.loiter_radius_m
     assert inside[1] < 90.0
+
+
+@pytest.mark.parametrize("twd_deg", [0.0, 10.0, 25.0, 40.0, 90.0, 200.0])
+def test_from_beside_a_buoy_no_loiter_is_beaten_to(twd_deg):
+    """The line to it began 8 m from the buoy just rounded, 48° off the wind: headed, she turned onto it."""
+    buoy = Goal(en_m=(0.0, 0.0), radius_m=6.0, side=Side.STARBOARD, rounding_m=6.0)
+    made, config = voyage(buoy), replace(CONFIG, margin_m=8.0, margin_floor_m=4.0, tack_corridor_m=10.0)
+    end, twd_rad = (5.0, -6.0), math.radians(twd_deg)
+    place, room = loiter_place(made, config, end, twd_rad, wanted_m=19.0)
+    assert room >= config.loiter_radius_m
+    off_deg = abs(math.degrees(difference_rad(twd_rad, math.atan2(place[0] - end[0], place[1] - end[1]))))
+    assert place == end or off_deg >= 59.0
 
 
 def test_in_a_pocket_without_room_the_loiter_is_where_it_is_roomiest():

@@ -31,7 +31,7 @@ from companion.skipper.step.saved import Standing
 from companion.skipper.step.snapshot import PlanOutcome
 from companion.skipper.step.state import Retry
 from companion.skipper.way.voyage import Goal, Refuge
-from tests.skipper.moments import moment, route
+from tests.skipper.moments import NOW_S, moment, route
 from tests.skipper.planning.test_tacks_fail import turn_of
 from tests.skipper.test_voyage import make
 from tests.skipper.world import with_parts
@@ -345,6 +345,19 @@ def test_an_autopilot_lags_only_where_its_number_is_known_to_be_of_our_route(che
     locate(ctx)
     assert ctx.state.mission.own_index == 1
     assert (ctx.state.mission.passed_since_s is not None) is checked
+
+
+@pytest.mark.parametrize(("mission_seq", "failures"), [(2, 3), (3, 0)])
+def test_what_failed_on_the_way_is_tried_anew_at_the_missions_end(mission_seq, failures):
+    """Tries to lead on from the last waypoint had doubled the wait: she loitered 40 s with the way open."""
+    way = route((0.0, 20.0), (0.0, 60.0), GOAL)
+    told = replace(moment(way).autopilot, mission_seq=mission_seq)
+    retry = Retry(failures=3, not_before_s=NOW_S + 36.0)
+    ctx = moment(
+        way, at=(0.0, 40.0), mission={"index": 1, "checked": True}, plans={"retry": retry}, seen={"autopilot": told}
+    )
+    locate(ctx)
+    assert ctx.state.plans.retry.failures == failures
 
 
 def test_a_gate_is_never_left_out_as_passed():
