@@ -17,10 +17,8 @@ from companion.skipper.way.drying import DryingWater, TimedWater, timed
 from companion.traffic.plans import TimedLeg
 
 DAY_S = 86_400.0
-LEAVES_S, LEAVES_MPS = (
-    120.0,
-    0.5,
-)  # what leaving water that is about to dry takes: a plan and a turn, and a slow way out
+LEAVES_S = 120.0  # what leaving water that is about to dry takes: a plan and a turn ...
+LEAVES_MPS = 0.5  # ... and a slow way out
 
 
 def told(ctx: StepContext, start_en: PointEn, after_s: float, margin_m: float) -> TimedWater:
