@@ -139,7 +139,7 @@ class Persisted:
     quarters: int = 0  # ``bearing_rad`` in quarter turns: the place afterwards says the rest
     standing: Standing | None = None  # the order that stands
     reached: tuple[int, ...] = ()  # goals reached, in order
-    skipped: int = 0  # goals given up by order
+    skipped: int = 0  # goals given up: by order, and boxes that she could not stay in
     set_sail_utc_s: float | None = None  # Unix time of setting sail
     inside: tuple[int, float] | None = None  # the goal whose box the boat stays in, Unix time of entry
     searched: tuple[tuple[float, float], ...] = ()  # the track of the search that is next

@@ -445,7 +445,7 @@ class Orders:
 
     standing: Standing | None = None  # the order that stands until the boat is told to go on
     answered: tuple[Answered, ...] = ()  # the last order of each who gave one lately
-    skipped: int = 0  # goals given up by order
+    skipped: int = 0  # goals given up: by order, and boxes that she could not stay in
 
 
 @dataclass(frozen=True, kw_only=True)
