@@ -148,19 +148,11 @@ def _has_stayed(ctx: StepContext, gate: Gate, boat: PointEn) -> bool:
 
 def _leave_out(ctx: StepContext, gate: Gate, boat: PointEn) -> None:
     """Give up a box that she comes to and cannot stay in, for the goal behind it."""
-    following = gate.goal + 1
-    if following >= len(ctx.voyage.legs) or distance_m(boat, gate.en_m) > DECIDES_M:
+    if gate.goal + 1 >= len(ctx.voyage.legs) or distance_m(boat, gate.en_m) > DECIDES_M:
         return
     why = _cannot_stay(ctx, gate)
-    if not why:
-        return
-    ctx.say(Severity.WARNING, "box", f"{gate.name} is given up: {why}", every_s=0.0)
-    ctx.let_go_of_plan()
-    ctx.approach(Approach(goal=following, en_m=boat))
-    ctx.set(
-        orders=changed(ctx.state.orders, skipped=ctx.state.orders.skipped + 1),
-        plans=changed(ctx.state.plans, asked=f"{gate.name} is given up", asked_as=ReplanReason.NEXT_GOAL),
-    )
+    if why:
+        ctx.say(Severity.WARNING, "box", f"{ctx.give_up(gate, ReplanReason.NEXT_GOAL)}: {why}", every_s=0.0)
 
 
 def _cannot_stay(ctx: StepContext, gate: Gate) -> str:

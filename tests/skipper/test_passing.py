@@ -22,7 +22,7 @@ from companion.skipper.step.config import Guidance
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.snapshot import PlanOutcome
-from companion.skipper.step.state import Phase
+from companion.skipper.step.state import PATIENT, Phase, Retry
 from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.line import ahead_m
 from companion.skipper.way.voyage import Box, Goal, Line, Side
@@ -472,6 +472,19 @@ def test_in_a_dock_she_stays_while_a_loiter_has_room_in_that_wind(winds_mps, ent
     assert ("box entered" in told) is enters
     assert why in told[int(enters)]
     assert (w.state.progress.reached == (0,)) is enters
+
+
+def test_a_box_that_she_gives_up_is_planned_past_without_the_wait_that_stood():
+    walls = [shapely.box(-40.0, 40.0, 40.0, 60.0), *(shapely.box(e, 60.0, e + 14.0, 140.0) for e in (-40.0, 26.0))]
+    way = route((0.0, 100.0), (0.0, 100.0), gate_of=(0, -1))
+    waits = {"retry": Retry(failures=3, not_before_s=1e9)}
+    dock = {"goals": (box(), END), "obstacles": walls, "config": {"margin_m": 6.0, "margin_floor_m": 4.0}}
+    ctx = moment(way, at=(0.0, 20.0), tws_mps=12.0, plans=waits, **dock)
+    pass_gates(ctx)
+    assert any("box is given up: a loiter takes" in a.text for a in ctx.actions if isinstance(a, Announce))
+    assert (ctx.state.progress.gate, ctx.state.orders.skipped) == (1, 1)
+    assert ctx.state.plans.asked_as is ReplanReason.NEXT_GOAL
+    assert ctx.state.plans.retry == PATIENT
 
 
 def test_the_time_in_a_box_is_counted_on_over_a_restart():

@@ -42,7 +42,7 @@ from companion.skipper.step.context import StepContext
 from companion.skipper.step.route import DiversionKind
 from companion.skipper.step.saved import Standing
 from companion.skipper.step.state import PATIENT, Answered, FieldSteering, Phase
-from companion.skipper.way import Approach, PointEn, distance_m
+from companion.skipper.way import PointEn, distance_m
 from companion.words import counted
 
 REMEMBERED_S = 10.0  # longer than any station repeats a command that is not answered
@@ -251,19 +251,11 @@ def _skip_goal(ctx: StepContext, _: Order) -> Answer:
     gate, boat = ctx.gate, ctx.boat_en
     if gate is None or ctx.state.voyage.over:
         return _not_now("no goal is left")
-    following = gate.goal + 1
-    if following >= len(ctx.voyage.legs):
+    if gate.goal + 1 >= len(ctx.voyage.legs):
         return _not_now(f"{gate.name} is the last goal: {Verb.HOLD} to stay here, {Verb.HOME} or {Verb.REFUGE}")
     if boat is None or ctx.state.mission.adoptable is not None:
         return _not_now("her position is not known" if boat is None else "the mission on board is being compared")
-    ctx.let_go_of_plan()
-    ctx.approach(Approach(goal=following, en_m=boat))
-    text = f"{gate.name} is given up"
-    ctx.set(
-        orders=changed(ctx.state.orders, skipped=ctx.state.orders.skipped + 1),
-        progress=changed(ctx.state.progress, missed_s=None),
-        plans=changed(ctx.state.plans, retry=PATIENT, asked=text, asked_as=ReplanReason.ORDER),
-    )
+    text = ctx.give_up(gate, ReplanReason.ORDER)
     standing = ctx.state.orders.standing
     then = f"{ctx.gates[ctx.state.progress.gate].name} is next when {standing.words} ends" if standing else _next(ctx)
     return _done(f"{text}: {then}")

@@ -21,6 +21,7 @@ from companion.skipper.step.actions import (
     Announce,
     Arm,
     CancelPlan,
+    ReplanReason,
     RunMotor,
     SetCurrent,
     SetMode,
@@ -35,6 +36,7 @@ from companion.skipper.step.missions import ends_safely
 from companion.skipper.step.route import Diversion, Route
 from companion.skipper.step.snapshot import Snapshot, still_air, wind_mean, wind_now
 from companion.skipper.step.state import (
+    PATIENT,
     Adrift,
     Alarms,
     Announced,
@@ -322,6 +324,22 @@ class StepContext:
             )
         )
         self.void_route()
+
+    def give_up(self, gate: Gate, asked_as: ReplanReason) -> str:
+        """Leave a gate's goal for the one behind it, from where the boat is, and return that in words.
+
+        A mark of it that was missed is not gone back for, and nothing is waited for before the plan.
+        """
+        assert self.boat_en is not None
+        self.let_go_of_plan()
+        self.approach(Approach(goal=gate.goal + 1, en_m=self.boat_en))
+        text = f"{gate.name} is given up"
+        self.set(
+            orders=changed(self.state.orders, skipped=self.state.orders.skipped + 1),
+            progress=changed(self.state.progress, missed_s=None),
+            plans=changed(self.state.plans, retry=PATIENT, asked=text, asked_as=asked_as),
+        )
+        return text
 
     def void_route(self) -> None:
         """Let no item of the mission on board, or on its way there, count for the gate that is next or a later one."""
