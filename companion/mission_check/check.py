@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import shapely
@@ -22,11 +22,11 @@ from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
 from companion.skipper import SkipperConfig
 from companion.skipper.planning import LACK_M, TRACKS_M
+from companion.skipper.step import lacking_m
 from companion.skipper.way import KEEP_SHARE, SAME_M, Gate, Side
 
 HAIR_M = 0.005  # a depth is written in centimetres
 LEAST_NO_GO_DEG = 20.0  # an ice boat's
-LOITER_M = SkipperConfig().loiter_radius_m  # the least that she reckons with
 WINDS_MPS = range(1, 13)  # in which a loiter is looked at: no gale is ordinary weather
 SMALL_M = 3.0  # a fix is good to 2.5 m
 
@@ -285,13 +285,15 @@ def _drying(mission: Mission) -> Iterator[Finding]:
 def _boxes(mission: Mission) -> Iterator[Finding]:
     """Yield the boxes in which a loiter has room in moderate winds only, and those that dry: either ends her stay."""
     voyage = voyage_of(mission)
-    floor_m = min(mission.margin_floor_m, mission.margin_m)
+    config = SkipperConfig(margin_m=mission.margin_m, margin_floor_m=mission.margin_floor_m)
+    floor_m, least_m = min(config.margin_floor_m, config.margin_m), config.loiter_radius_m
+    swings_m = {tws: max(least_m, round(loiter_swing_m(voyage.boat.polar, tws))) for tws in WINDS_MPS}
+    in_winds = {tws: replace(config, loiter_radius_m=swing_m) for tws, swing_m in swings_m.items()}
     for number, goal in enumerate(voyage.goals, start=1):
         if goal.box is None:
             continue
         has_m = float(voyage.area.clearance_m([goal.en_m])[0])
-        swings = [max(LOITER_M, round(loiter_swing_m(voyage.boat.polar, tws))) for tws in WINDS_MPS]
-        winds = [tws for tws, swing_m in zip(WINDS_MPS, swings, strict=True) if swing_m + floor_m - LACK_M > has_m]
+        winds = [tws for tws, known in in_winds.items() if lacking_m(known, voyage.area, goal.en_m) > LACK_M]
         if winds:
             strong = "any wind" if winds[0] == WINDS_MPS[0] else f"{winds[0]} m/s of wind and more"
             yield Finding(

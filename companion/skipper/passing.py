@@ -15,7 +15,7 @@ from companion.skipper.planning.tides import dries_under
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waits_for_gun
 from companion.skipper.step.actions import CancelPlan, ReplanReason
 from companion.skipper.step.context import FRESH_S, StepContext
-from companion.skipper.step.missions import roomy_m
+from companion.skipper.step.missions import lacking_m, roomy_m
 from companion.skipper.step.state import Inside
 from companion.skipper.way.gates import Approach, Gate, again, has_come_round, is_on_wrong_side
 from companion.skipper.way.geometry import distance_m, leg_distance_m
@@ -160,9 +160,9 @@ def _cannot_stay(ctx: StepContext, gate: Gate) -> str:
     dries = dries_under(ctx, gate.en_m)
     if dries:
         return f"{dries} is about to dry"
-    needs_m, has_m = roomy_m(ctx.known_config), float(ctx.voyage.area.clearance_m([gate.en_m])[0])
-    if needs_m - has_m > LACK_M:
-        return f"a loiter takes {needs_m:.0f} m to each side in this wind, and has {has_m:.0f}"
+    needs_m, lacks_m = roomy_m(ctx.known_config), lacking_m(ctx.known_config, ctx.voyage.area, gate.en_m)
+    if lacks_m > LACK_M:
+        return f"a loiter takes {needs_m:.0f} m to each side in this wind, and has {needs_m - lacks_m:.0f}"
     return ""
 
 

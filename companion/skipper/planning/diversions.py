@@ -17,7 +17,7 @@ from companion.skipper.planning.statement import aim_near
 from companion.skipper.planning.track import steps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
 from companion.skipper.step import Diversion, DiversionKind, SafeEnd, SkipperConfig, StepContext
-from companion.skipper.step.missions import ROOMIER_BY_M, loiter_place, place_with_room, roomy_m
+from companion.skipper.step.missions import ROOMIER_BY_M, lacking_m, loiter_place, place_with_room, roomy_m
 from companion.skipper.step.route import HOME_RADIUS_M
 from companion.skipper.way.autopilot_fence import Drawn, HomeCircle
 from companion.skipper.way.gates import Gate
@@ -356,23 +356,22 @@ def to_be_held(ctx: StepContext, why: str) -> Diversion | None:
 
     That is planned to where it is near by, too: the turn towards it may be what there is no room for.
     """
-    boat, water, wanted_m = ctx.boat_en, ctx.to_stay_in.area, roomy_m(ctx.known_config)
+    boat, water, config = ctx.boat_en, ctx.to_stay_in.area, ctx.known_config
     if boat is None or not ctx.ahead():
         return _stay(ctx, why)
     is_bound = _is_bound(ctx, ROOM)
-    if is_bound or float(water.clearance_m([boat])[0]) < wanted_m - LACK_M:
+    if is_bound or lacking_m(config, water, boat) > LACK_M:
         room = _to_room(ctx, boat, why)
         if room is not None and room.en_m is not None:
             near_m, there_m = water.clearance_m([held_at(ctx, boat)[0], room.en_m])
-            if is_bound or there_m > near_m + min(wanted_m - near_m, ROOMIER_BY_M) - LACK_M:
+            if is_bound or there_m > near_m + min(roomy_m(config) - near_m, ROOMIER_BY_M) - LACK_M:
                 return room
     return _stay(ctx, why)
 
 
 def room_lacking_m(ctx: StepContext, boat: PointEn) -> float:
     """Return how much room a loiter lacks to keep the margin's floor where a boat is held [m], below 0: none."""
-    place, _ = held_at(ctx, boat)
-    return roomy_m(ctx.known_config) - float(ctx.to_stay_in.area.clearance_m([place])[0])
+    return lacking_m(ctx.known_config, ctx.to_stay_in.area, held_at(ctx, boat)[0])
 
 
 def held_at(ctx: StepContext, boat: PointEn) -> tuple[PointEn, float]:

@@ -16,7 +16,7 @@ from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_w
 from companion.skipper.planning.vessels import lies_in_the_way, meetings
 from companion.skipper.step import DiversionKind, ReplanReason
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.missions import roomy_m
+from companion.skipper.step.missions import lacking_m
 from companion.skipper.step.state import PendingPlan, Phase
 from companion.skipper.way.drying import AHEAD_S
 from companion.skipper.way.geometry import distance_m
@@ -200,8 +200,7 @@ def _ends_cramped(ctx: StepContext, pending: PendingPlan) -> bool:
     route = ctx.state.mission.route
     if route is None or pending.reason is not ReplanReason.NEXT_GOAL or pending.from_index is None:
         return False
-    has_m = float(ctx.to_stay_in.area.clearance_m([route.points_en_m[-1]])[0])
-    return has_m < roomy_m(ctx.known_config) - LACK_M
+    return lacking_m(ctx.known_config, ctx.to_stay_in.area, route.points_en_m[-1]) > LACK_M
 
 
 def _foul(ctx: StepContext, pending: PendingPlan) -> str:

@@ -22,7 +22,7 @@ from companion.skipper.step.actions import (
 )
 from companion.skipper.step.config import Ends, Guidance, Learning, Permissions, ReplanPolicy, SafeEnd, SkipperConfig
 from companion.skipper.step.context import StepContext, is_off_plan
-from companion.skipper.step.missions import ends_safely
+from companion.skipper.step.missions import ends_safely, lacking_m
 from companion.skipper.step.route import Diversion, DiversionKind, Route
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.snapshot import (
@@ -101,4 +101,5 @@ __all__ = [
     "ends_safely",
     "is_given_up",
     "is_off_plan",
+    "lacking_m",
 ]

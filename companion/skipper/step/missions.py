@@ -72,6 +72,11 @@ def roomy_m(config: SkipperConfig) -> float:
     return config.loiter_radius_m + min(config.margin_floor_m, config.margin_m)
 
 
+def lacking_m(config: SkipperConfig, area: AreaLike, place_en: PointEn) -> float:
+    """Return how much room a loiter at a place lacks to keep the margin's floor in it [m], below 0: none."""
+    return roomy_m(config) - float(area.clearance_m([place_en])[0])
+
+
 def loiter_place(
     voyage: Voyage, config: SkipperConfig, end_en: PointEn, twd_from_rad: float, *, wanted_m: float = 0.0
 ) -> tuple[PointEn, float]:
