@@ -35,6 +35,7 @@ SPARE_M = 0.3  # a boat below the floor may come no nearer than this more: the t
 TACKS_RISK = 1e-3  # a chance of contact by failed tacks is greater than another by more than this
 NO_NEARER_M = 0.5  # a way clears what a boat lies in to within this
 MARGIN_M = 0.1  # margins that differ by less are the same
+NOT_PERMITTED_S = 3600.0  # a dry run plans anew each minute; that it uploads nothing is told with no more of them
 
 
 def upload(
@@ -74,7 +75,9 @@ def upload(
     if not ctx.act(action):
         ctx.set(plans=changed(ctx.state.plans, ready_route=route))
         ready = f"a plan is ready: {_in_words(route)}{text and '; '}{text}"
-        ctx.say(Severity.WARNING, "upload not permitted", f"{ready}; uploading is not permitted")
+        ctx.say(
+            Severity.WARNING, "upload not permitted", f"{ready}; uploading is not permitted", every_s=NOT_PERMITTED_S
+        )
         return
     # A read that is still under way will tell of the mission before this upload: its answer is not wanted.
     ctx.set(

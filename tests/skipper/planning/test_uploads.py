@@ -33,7 +33,7 @@ from companion.skipper.step.actions import Announce, Change, ReplanReason
 from companion.skipper.step.config import DRY_RUN
 from companion.skipper.step.missions import stopgap
 from companion.skipper.step.snapshot import WindEstimate
-from companion.skipper.step.state import PendingPlan, PendingUpload, Retry
+from companion.skipper.step.state import Announced, PendingPlan, PendingUpload, Retry
 from tests.skipper.moments import NOW_S, moment, route
 
 OLD = route((300.0, 0.0), (600.0, 0.0), (600.0, 600.0), (600.0, 600.0), gate_of=(-1, -1, 0, -1))
@@ -114,6 +114,16 @@ def test_without_permission_it_stays_ready_and_is_said():
     )
     assert ctx.state.plans.ready_route.items == marked(NEW.items)
     assert (ctx.state.pending.upload, ctx.state.pending.read) == (None, (3, NOW_S))
+
+
+@pytest.mark.parametrize(("ago_s", "is_told"), [(61.0, False), (3590.0, False), (3601.0, True)])
+def test_that_uploading_is_not_permitted_is_told_of_one_plan_an_hour(ago_s, is_told):
+    """A dry run plans anew each minute, and each of its plans was a warning."""
+    ctx = moment(OLD, mission=CHECKED, permissions=DRY_RUN)
+    ctx.set(announced=Announced(codes=(("upload not permitted", NOW_S - ago_s),)))
+    upload(ctx, NEW, None, "")
+    assert any(isinstance(a, Announce) for a in ctx.actions) is is_told
+    assert ctx.state.plans.ready_route.items == marked(NEW.items)
 
 
 # ------------------------------------------------------------------------------------------------------- its end
