@@ -1,4 +1,4 @@
-"""Addresses: a host with its port, where NMEA 0183 goes to, and where a Signal K server is."""
+"""Addresses: a host with its port, a serial port's rate, where NMEA 0183 goes to, and where a Signal K server is."""
 
 from __future__ import annotations
 
@@ -46,6 +46,15 @@ def host_port(text: str) -> tuple[str, int] | None:
     if match is None or not 0 < int(match[3]) < 65536:
         return None
     return match[1] or match[2], int(match[3])
+
+
+def is_baud(text: str) -> bool:
+    """Return whether a text is the rate of a serial port [baud].
+
+    >>> is_baud("57600"), is_baud("576x"), is_baud("57")
+    (True, False, False)
+    """
+    return text.isascii() and text.isdigit() and 1200 <= int(text) <= 12_000_000
 
 
 def parse_nmea(text: str) -> OutputName:

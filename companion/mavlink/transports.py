@@ -25,7 +25,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, cast
 
-from companion.addresses import host_port
+from companion.addresses import host_port, is_baud
 from companion.clock import ended, now_s
 from companion.errors import InputError, LinkError
 
@@ -132,7 +132,7 @@ def parse_link(text: str) -> LinkName:
         if serial is None:
             raise bad("more than one line")
         device, baud = serial.group(1), serial.group(2)
-        if baud is not None and not (baud.isascii() and baud.isdigit() and 1200 <= int(baud) <= 12_000_000):
+        if baud is not None and not is_baud(baud):
             raise bad(f"{baud!r} is not a baud rate")
         return LinkName(text, "serial", device=device, baud=int(baud) if baud else DEFAULT_BAUD)
     kind, colon, rest = text.partition(":")

@@ -16,6 +16,7 @@ from argparse import ArgumentParser, ArgumentTypeError
 from collections.abc import Callable
 from pathlib import Path
 
+from companion.addresses import is_baud
 from companion.messages import GeoPoint
 
 _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]{0,252}[A-Za-z0-9])?")
@@ -111,13 +112,15 @@ def system_id(text: str) -> int:
 def absent_device(link: str | None) -> str:
     """Return what is said where a LINK names a serial port that is not there; "" for one that is, and for any other.
 
-    It may be plugged in later, and is waited for.
+    It may be plugged in later, and is waited for; a slip in its rate is not, and is refused by who opens it.
 
     >>> absent_device("COM77:57600"), absent_device("tcp:127.0.0.1:5760")
     ('COM77: no such device; is it plugged in? waiting for it', '')
     """
-    named = re.fullmatch(r"(?:serial:)?((?:/|COM\d).*?)(?::\w*)?", link or "")
+    named = re.fullmatch(r"(?:serial:)?((?:/|COM\d).*?)(?::(\w*))?", link or "")
     if named is None or Path(named.group(1)).exists():
+        return ""
+    if named.group(2) is not None and not is_baud(named.group(2)):
         return ""
     return f"{named.group(1)}: no such device; is it plugged in? waiting for it"
 

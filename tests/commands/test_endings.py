@@ -291,6 +291,15 @@ def test_a_port_that_is_not_there_is_told_first(tmp_path, capsys):
     assert absent_device("COM3").startswith("COM3: no such device")
 
 
+@pytest.mark.parametrize("rate", ["576x", "", "57", "99999999"])
+@pytest.mark.parametrize("command", [["doctor"], ["status", "--once"]])
+def test_a_slip_in_a_port_s_rate_is_told_and_not_waited_for(tmp_path, capsys, command, rate):
+    """ "No such device; waiting for it" came before the refusal."""
+    assert cli.main([*command, "--link", str(tmp_path / f"ttyUSB0:{rate}")]) == 2
+    (said,) = (line for line in capsys.readouterr().err.splitlines() if not line.startswith("looking at"))
+    assert f"{rate!r} is not a baud rate" in said
+
+
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
