@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from companion.commands.output import force_option, refuse_existing, write_files
 from companion.errors import InputError, JobError, unreadable
 from companion.program.arguments import add_command, moment, number, place
-from companion.words import counted, listed
+from companion.words import counted, file_name, listed
 
 if TYPE_CHECKING:
     from companion.chart import Chart, ChartArea
@@ -22,7 +22,7 @@ _EPILOG = """\
 examples:
   companion chart import US4MD81M.000 --mission missions/bay.toml
   companion chart import cells/*.000 land.gpkg --around 38.97,-76.47 --radius 3000 --depth 1.5
-  companion chart shoals voyages/today found.geojson --mission missions/bay.toml
+  companion chart shoals voyages/bay.state.json found.geojson --mission missions/bay.toml
   companion chart import gebco.nc emodnet.asc --mission passage.toml --out chart
 
 Reads S-57 cells (.000, with the updates .001 ... beside them), shapefiles, GeoPackages, GeoJSON and FlatGeobuf of land,
@@ -126,14 +126,9 @@ def _shoals(args: argparse.Namespace) -> int:
     from companion.geo.frame import LocalFrame
     from companion.geofence import Circle, Document, Zone, ZoneKind, load_mission
     from companion.geofence.formats import write
-    from companion.telemetry.folder import STATE
     from companion.telemetry.state_file import read_state
 
-    path = Path(args.state)
-    if path.is_dir():
-        if not (path / STATE).exists():
-            raise InputError(args.state, "", f"is a folder without {STATE}", "name a voyage's folder, or a saved state")
-        path = path / STATE
+    path = _state_in(args.state)
     mission = load_mission(Path(args.mission))
     frame, transducer_m = mission.frame(), mission.boat.transducer_m
     try:
@@ -160,6 +155,32 @@ def _shoals(args: argparse.Namespace) -> int:
     write_out(write(document, args.out, part="fence"), args.out, lossy=False, force=args.force)
     print(f"{args.out}: {counted(len(zones), 'shoal')}, drawn with the doubt about each. Not fit for navigation.")
     return 0
+
+
+def _state_in(named: str) -> Path:
+    """Return the saved state that is named, by itself or by a folder that holds it. Raises InputError."""
+    from companion.telemetry.folder import STATE, VOYAGE, believed, read_description
+
+    path = Path(named)
+    if not path.is_dir():
+        return path
+    if (path / STATE).exists():
+        return path / STATE
+    if (path / VOYAGE).is_file():
+        told = read_description(path)
+        with believed(path / VOYAGE, "run, mission"):
+            is_dry, name = bool(told["run"]["dry_run"]), str(told["mission"]["name"])
+        if is_dry:
+            raise InputError(named, "", "is of a dry run, which keeps no shoals", "name a voyage that was sailed")
+        beside = path.parent / f"{file_name(name)}.state.json"
+        if beside.exists():
+            raise InputError(
+                named,
+                "",
+                f"holds no {STATE}",
+                f"name {beside}, which `companion run` keeps of the last voyage of {name}",
+            )
+    raise InputError(named, "", f"is a folder without {STATE}", "name a voyage's folder, or a saved state")
 
 
 def _import(args: argparse.Namespace) -> int:

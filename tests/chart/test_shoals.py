@@ -10,7 +10,7 @@ from companion.cli import main
 from companion.geofence import Circle, load_mission, read
 from companion.skipper.step import Persisted
 from companion.skipper.way.shoals import Shoal
-from companion.telemetry.folder import STATE
+from companion.telemetry.folder import STATE, VOYAGE
 
 MISSION = "sitl/missions/shoaling.toml"
 FOUND = Shoal(en_m=(10.0, 200.0), radius_m=20.0, doubt_m=7.0, depth_m=1.8)
@@ -42,6 +42,27 @@ def test_where_a_table_told_the_tide_its_depth_is_that_below_the_datum(tmp_path,
     assert main(["chart", "shoals", voyage(tmp_path, shoal), str(out), "--mission", MISSION]) == 0
     (zone,) = read(out).zones
     assert zone.name == "shoal 1: 1.8 m sounded" if not told else told in zone.name
+
+
+def test_a_dry_run_and_a_voyage_whose_state_lies_beside_it_are_told_as_what_they_are(tmp_path, capsys):
+    """ "Name a voyage's folder" was said of both."""
+    out, folder = tmp_path / "found.geojson", tmp_path / "today"
+    folder.mkdir()
+    asked = ["chart", "shoals", str(folder), str(out), "--mission", MISSION]
+    (folder / VOYAGE).write_text('[mission]\nname = "the bay"\n[run]\ndry_run = true\n')
+    assert main(asked) == 2
+    told = f"companion chart: {folder}: is of a dry run, which keeps no shoals; name a voyage that was sailed\n"
+    assert capsys.readouterr().err == told
+    (folder / VOYAGE).write_text('[mission]\nname = "the bay"\n[run]\ndry_run = false\n')
+    assert main(asked) == 2
+    assert "is a folder without state.json; name a voyage's folder" in capsys.readouterr().err
+    (tmp_path / "the-bay.state.json").write_text("{}")
+    assert main(asked) == 2
+    beside = f"name {tmp_path / 'the-bay.state.json'}, which `companion run` keeps of the last voyage of the bay\n"
+    assert capsys.readouterr().err == f"companion chart: {folder}: holds no state.json; {beside}"
+    (folder / VOYAGE).write_text("mission = 3\n")
+    assert main(asked) == 2
+    assert "is not what a voyage records" in capsys.readouterr().err
 
 
 def test_what_holds_none_or_is_no_state_is_one_line(tmp_path, capsys):
