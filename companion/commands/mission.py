@@ -141,8 +141,7 @@ def _check(args: argparse.Namespace) -> int:
     from companion.compose import field_words
     from companion.mission_check import check_mission, current_words_of, tide_words_of, wind_limit_words
 
-    why = "an area of many positions takes long, and the first time on a machine kernels are compiled"
-    with patience("checking", why):
+    with patience("checking", "an area of many positions takes long"):
         judged = check_mission(Path(args.file), from_deg=args.wind[1] if args.wind else None, unix_s=time.time())
     if judged.mission is None or judged.refusals:
         raise judged.refusals[0]

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Self
 
 from companion.disk import Disk, reason, what_is_there
 from companion.errors import InputError, JobError
+from companion.kernels.jit import begun
 from companion.program import control
-from companion.words import counted
+from companion.words import counted, listed
 
 # Beyond this it is told why nothing happens [s]: cached, planning and drawing each take less.
 PATIENCE_S = 3.0
-FIRST_TIME = "the first time on a machine kernels are compiled and fonts are listed, which takes long"
 
 if TYPE_CHECKING:
     from companion.geofence import Document, Finding
@@ -99,15 +99,35 @@ def refuse_existing(names: Sequence[str], *, force: bool) -> None:
 
 
 @contextlib.contextmanager
-def patience(doing: str, why: str = FIRST_TIME) -> Iterator[None]:
-    """Say on stderr what is done and why nothing happens when the work within takes long."""
-    waiting = threading.Timer(PATIENCE_S, sys.stderr.write, (f"note: {doing}; {why}\n",))
+def patience(doing: str, why: str = "") -> Iterator[None]:
+    """Say on stderr what is done and why nothing happens when the work within takes long.
+
+    What is done once on a machine is named where it is done now; ``why``: what takes long otherwise.
+    """
+    before = begun()
+
+    def say() -> None:
+        once = [
+            what
+            for what, is_so in (("kernels are compiled", begun() > before), ("fonts are listed", _are_fonts_listed()))
+            if is_so
+        ]
+        because = f"{listed(once)}, once on each machine" if once else why
+        sys.stderr.write(f"note: {doing}; {because}\n" if because else f"note: still {doing}\n")
+
+    waiting = threading.Timer(PATIENCE_S, say)
     waiting.daemon = True
     waiting.start()
     try:
         yield
     finally:
         waiting.cancel()
+
+
+def _are_fonts_listed() -> bool:
+    """Return whether matplotlib, which is here to draw, has kept no list of the machine's fonts yet."""
+    folder = getattr(sys.modules.get("matplotlib"), "get_cachedir", None)
+    return folder is not None and not any(Path(folder()).glob("fontlist-*.json"))
 
 
 SAID_EVERY_S = 0.5

@@ -20,6 +20,7 @@ from types import FunctionType
 from typing import Any
 
 import numba
+from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.types.misc import unliteral
@@ -85,6 +86,25 @@ class Locator:
     def get_disambiguator(self) -> str:
         """Return what tells the files of two kernels of one name apart: versions of one kernel lie side by side."""
         return self._digest
+
+
+class Begun(event.Listener):  # type: ignore[misc]
+    """Counts the kernels that this process has begun to compile: what is loaded from the cache is none of them."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def on_start(self, event: object) -> None:
+        """Count one."""
+        del event
+        self.count += 1
+
+    def on_end(self, event: object) -> None:
+        """Nothing."""
+
+
+BEGUN = Begun()
+event.register("numba:compile", BEGUN)
 
 
 class Compiled(CPUDispatcher):  # type: ignore[misc]

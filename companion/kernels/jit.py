@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
@@ -22,3 +23,9 @@ def kernel(function: F) -> F:
     from companion.kernels.cache import Compiled
 
     return cast("F", Compiled(function))
+
+
+def begun() -> int:
+    """Return how many kernels this process has begun to compile; numba is not loaded for the answer."""
+    cache = sys.modules.get("companion.kernels.cache")
+    return 0 if cache is None else int(cache.BEGUN.count)

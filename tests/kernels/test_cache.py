@@ -11,6 +11,7 @@ import pytest
 
 from companion.errors import JobError
 from companion.kernels import places
+from companion.kernels.jit import begun
 
 KNOTS = """
 from companion.kernels.jit import kernel
@@ -65,9 +66,10 @@ def is_compiled_anew(kernel):
 
 def test_the_same_content_is_not_compiled_again(load):
     """Numba's own cache goes by the file's place, time and size: each clone, and each install, compiled anew."""
-    first = load()
+    first, before = load(), begun()
     assert first(3.0) == 7.0
     assert is_compiled_anew(first)
+    assert begun() == before + 2
     for changed in (
         {},
         {"boat": f"# a comment\n\n\n{BOAT}"},
@@ -76,6 +78,7 @@ def test_the_same_content_is_not_compiled_again(load):
         again = load(**changed)
         assert again(3.0) == 7.0
         assert not is_compiled_anew(again), changed
+    assert begun() == before + 2
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,11 @@
 
 import json
 import shutil
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import gpxpy
 import matplotlib.pyplot as plt
@@ -252,7 +254,7 @@ def test_what_takes_long_says_why(monkeypatch, capsys):
     monkeypatch.setattr(output, "PATIENCE_S", 0.02)
     with output.patience("drawing"):
         time.sleep(0.2)
-    assert "note: drawing; the first time" in capsys.readouterr().err
+    assert capsys.readouterr().err == "note: still drawing\n"
     with output.patience("checking", "the area is large"):
         time.sleep(0.2)
     assert capsys.readouterr().err == "note: checking; the area is large\n"
@@ -260,6 +262,28 @@ def test_what_takes_long_says_why(monkeypatch, capsys):
         pass
     time.sleep(0.05)
     assert capsys.readouterr().err == ""
+
+
+def test_that_kernels_are_compiled_or_fonts_are_listed_is_said_while_that_is_so(tmp_path, monkeypatch, capsys):
+    """It was said of everything that took three seconds, for ever."""
+    matplotlib = SimpleNamespace(get_cachedir=lambda: str(tmp_path))
+    monkeypatch.setattr(output, "PATIENCE_S", 0.02)
+    monkeypatch.setitem(sys.modules, "matplotlib", matplotlib)
+    begun = iter([7, 7, 7, 8, 8, 9])
+    monkeypatch.setattr(output, "begun", lambda: next(begun))
+    told = []
+    for has_fonts in (False, True, False):
+        (tmp_path / "fontlist-v390.json").unlink(missing_ok=True)
+        if not has_fonts:
+            (tmp_path / "fontlist-v390.json").touch()
+        with output.patience("drawing", "the area is large"):
+            time.sleep(0.2)
+        told.append(capsys.readouterr().err)
+    assert told == [
+        "note: drawing; the area is large\n",
+        "note: drawing; kernels are compiled and fonts are listed, once on each machine\n",
+        "note: drawing; kernels are compiled, once on each machine\n",
+    ]
 
 
 def test_places_and_dates_in_words():
