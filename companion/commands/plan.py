@@ -19,7 +19,7 @@ from companion.planner.courses import courses
 from companion.planner.problem import evaluate
 from companion.planners import ALGORITHMS
 from companion.program.arguments import add_command, moment, number, out_file, picture, shifts, whole, wind
-from companion.words import counted
+from companion.words import counted, listed
 
 if TYPE_CHECKING:
     from companion.geofence import Mission
@@ -256,7 +256,7 @@ def describe(problem: Problem, answer: Plan, margin_m: float = 0.0) -> str:
     length = sum(leg.length_m for leg in answer.legs)
     judged = evaluate(problem, answer.waypoints_en)
     gap = (
-        f", {100.0 * answer.gap:.1f} % above the bound of {answer.lower_bound_s:.1f} s"
+        f", {100.0 * answer.gap:.1f} % above the bound of {answer.lower_bound_s:.1f} s{_beyond_bound(problem)}"
         if math.isfinite(answer.gap)
         else ""
     )
@@ -283,6 +283,13 @@ def describe(problem: Problem, answer: Plan, margin_m: float = 0.0) -> str:
     if answer.why.text:
         lines += ["", answer.why.text]
     return "\n".join(lines)
+
+
+def _beyond_bound(problem: Problem) -> str:
+    """Return in words what is in the way at its hours alone: a bound is of what stands there always."""
+    sails = [bool(t.vx_mps or t.vy_mps or t.spread is not None) for t in problem.targets]
+    kinds = [*(["vessels"] if any(sails) else []), *(["water that is closed for a time"] if not all(sails) else [])]
+    return f", which knows nothing of {listed(kinds)}" if kinds else ""
 
 
 def _of_wind(problem: Problem, answer: Plan) -> list[str]:

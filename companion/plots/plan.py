@@ -229,7 +229,7 @@ def _title(problem: Problem, plan: Plan) -> str:
     if not plan.has_path:
         return f"{name}\nno path ({plan.status.value}): {plan.reason[:90]}"
     text = f"{name}\n{plan.algorithm}: {plan.cost_s:.0f} s in {counted(len(courses(plan.legs)), 'course')}"
-    if math.isfinite(plan.gap) and plan.lower_bound_s > 0.0:
+    if math.isfinite(plan.gap) and plan.lower_bound_s > 0.0 and not problem.targets:  # of which no bound knows
         text += f", {100.0 * plan.gap:.1f} % above the bound of {plan.lower_bound_s:.0f} s"
     if plan.risk is not None and problem.wind.sigma.model != "none":
         text += f"; risk at most {100.0 * plan.risk:.1f} %"

@@ -11,8 +11,9 @@ import pytest
 from companion import cli
 from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, leg_problem
-from companion.planner import ALGORITHMS, Problem
+from companion.planner import ALGORITHMS, Problem, plan
 from companion.planner.problem.evaluate import evaluate
+from companion.plots import plan as plan_picture
 from tests.planner.problem_json import to_dict
 
 GOOD = {
@@ -68,6 +69,26 @@ def test_it_prints_a_summary_and_writes_a_plan_that_scores(capsys, file, tmp_pat
     assert judged.time_s == pytest.approx(written["cost_s"])
     assert written["risk"] is not None
     assert all(leg["clearance_m"] is not None for leg in written["legs"])
+
+
+@pytest.mark.parametrize(
+    ("targets", "words"),
+    [
+        ([{"radius_m": 20, "until_s": 900}], "water that is closed for a time"),
+        ([{"radius_m": 20, "vy": 0.1}], "vessels"),
+        ([{"radius_m": 20, "vx": -0.1}, {"radius_m": 20}], "vessels and water that is closed for a time"),
+    ],
+)
+def test_what_is_in_the_way_for_a_time_is_named_as_unknown_to_the_bound(capsys, file, targets, words):
+    """ "58.6 % above the bound" was said of the best way round a bar that had dried."""
+    at = [{"x": 40.0 * n, "y": 160.0, **t} for n, t in enumerate(targets)]
+    code, out, err = run(capsys, file(targets=at), "--expansions", "2000")
+    assert code == 0, err
+    assert re.search(rf"% above the bound of [\d.]+ s, which knows nothing of {words}\n", out)
+    problem = Problem.from_json(file(targets=at))
+    assert "above the bound" not in plan_picture._title(problem, plan(problem, expansions=2000))
+    code, out, _ = run(capsys, file(), "--expansions", "2000")
+    assert re.search(r"% above the bound of [\d.]+ s\n", out)
 
 
 def test_json_is_json_and_only_json(capsys, file):
