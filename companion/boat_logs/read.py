@@ -137,6 +137,8 @@ def _read(path: Path) -> ReadLog:
     if not files[0].is_file():
         raise Useless("it is no file")
     data = [bytes_of(p) for p in files]
+    if not any(data):
+        raise Useless("it is empty")
     digest = hashlib.sha256(b"".join(data)).hexdigest()[:16]
     rows = Rows()
     system = _fill(files, data, rows)

@@ -36,6 +36,7 @@ A mission names the file: file = "pepper.toml" in its [boat].
 Exit codes: 0 written or told, 1 the logs hold too little sailing, 2 an invalid file or number.
 """
 TWA_DEG = (40.0, 45.0, 52.0, 60.0, 75.0, 90.0, 110.0, 120.0, 135.0, 150.0, 165.0, 180.0)
+_TAKES = "give voyage folders, .tlog, .BIN, CSV or NMEA"
 TRIAL_M = 1000.0  # from the start: nobody sails an hour to a trial
 MARK_M, MARK_SHARE = 10.0, 0.15  # a mark's radius, and the share of a board that it is at most
 MEDIAN = 0.5  # of the speeds that are written
@@ -164,14 +165,18 @@ def _learn(args: argparse.Namespace) -> int:
     old = f"{args.prior} was learned from it already"
     skipped += [Skipped(name=one.log.name, why=old) for one in read if one.digest in known]
     read = [one for one in read if one.digest not in known]
+    if not read and len(skipped) < 2:
+        name, why = (
+            (skipped[0].name, skipped[0].why) if skipped else (", ".join(map(str, args.logs)), "no log is in there")
+        )
+        raise JobError(f"{name}: {why}; {_TAKES}")
     for left in skipped:
         print(f"skipped {left.name}: {left.why}")
     for one in read:
         for note in one.log.notes:
             print(f"{one.log.name}: {note}")
     if not read:
-        none = f"{', '.join(map(str, args.logs))}: no log is in there; give voyage folders, .tlog, .BIN, CSV or NMEA"
-        raise JobError(f"none of {counted(len(paths), 'log')} can be learned from" if paths else none)
+        raise JobError(f"none of these {counted(len(paths), 'log')} can be learned from; {_TAKES}")
     print(f"learning from {counted(len(read), 'log')}", file=sys.stderr)
     try:
         lesson = lesson_of(

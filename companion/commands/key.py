@@ -173,6 +173,6 @@ def _ask(asks: bool, what: str) -> None:
     if not asks:
         return
     if not sys.stdin.isatty():
-        raise InputError(f"{what}?", "", "nobody is here to be asked", "say --yes")
+        raise InputError("--yes", "", f"is not said, and no terminal is here to ask: {what}?", "say it")
     if input(f"{what}? [y/N] ").strip().lower() not in {"y", "yes"}:
         raise JobError("nothing was changed")

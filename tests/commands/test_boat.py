@@ -3,6 +3,7 @@
 import json
 import math
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -104,6 +105,20 @@ def test_a_folder_without_logs_is_named(tmp_path, capsys):
     assert main(["boat", "learn", str(logs), "--from", str(guess), "--out", str(tmp_path / "p2.toml")]) == 1
     told = f"companion boat: {logs}: no log is in there; give voyage folders, .tlog, .BIN, CSV or NMEA\n"
     assert capsys.readouterr().err == told
+
+
+@pytest.mark.parametrize("name", ["log", "log.csv", "log.BIN", "log.tlog"])
+def test_an_empty_log_and_an_empty_boat_file_are_called_so(tmp_path, monkeypatch, capsys, name):
+    """ "it tells the boat's speed in 0 of 0 samples", and that the boat has no name, was said."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["boat", "guess", *SIZES, "--out", "pepper.toml"]) == 0
+    Path(name).touch()
+    assert main(["boat", "learn", name, "--from", "pepper.toml", "--out", "p2.toml"]) == 1
+    told = f"companion boat: {name}: it is empty; give voyage folders, .tlog, .BIN, CSV or NMEA"
+    assert capsys.readouterr().err.splitlines()[-1] == told
+    Path("none.toml").touch()
+    assert main(["boat", "learn", name, "--from", "none.toml", "--out", "p2.toml"]) == 2
+    assert capsys.readouterr().err == "companion boat: none.toml: is empty; companion boat guess writes one\n"
 
 
 def test_a_boat_is_learned_from_its_logs_and_sailed_by_a_mission(tmp_path, capsys):

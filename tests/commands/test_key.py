@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from companion.cli import main
 from companion.clock import run_virtual
 from companion.commands.key import put_on, take_off
-from companion.errors import JobError, LinkError
+from companion.errors import InputError, JobError, LinkError
 from companion.mavlink.autopilot import Autopilot
 from companion.mavlink.link import Link
 from companion.mavlink.signing import SigningStore, make_key, read_key
@@ -104,6 +104,9 @@ def test_nothing_is_done_to_an_armed_boat_or_without_consent(key, monkeypatch):
             monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
             monkeypatch.setattr("builtins.input", lambda _: "")
             with pytest.raises(JobError, match="nothing was changed"):
+                await put_on(lambda: usb.near, **told(SigningStore(key, NOW_S), asks=True))
+            monkeypatch.setattr("sys.stdin.isatty", lambda: False, raising=False)
+            with pytest.raises(InputError, match=r"^--yes: is not said, and no terminal .* system 1; .*\?; say it$"):
                 await put_on(lambda: usb.near, **told(SigningStore(key, NOW_S), asks=True))
             boat.core.set_armed(armed=True)
             with pytest.raises(JobError, match="armed"):

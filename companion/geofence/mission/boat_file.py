@@ -114,6 +114,8 @@ def read_boat_file(path: Path) -> BoatFile:
 
 def parse_boat_file(text: str, source: str) -> BoatFile:
     """Return the boat that ``text`` tells of; see ``read_boat_file``."""
+    if not text.strip():
+        raise InputError(source, "", "is empty", "companion boat guess writes one")
     raw = _raw(text, source)
     if "goal" in raw:
         raise InputError(source, "", "is a mission, not a boat file", f"check it by: companion mission check {source}")
