@@ -158,6 +158,8 @@ def read_steering(paths: list[Path]) -> tuple[list[SteeringLog], list[Skipped]]:
 def _steering(path: Path) -> SteeringLog:
     series = _Series()
     files = [p for p in parts(path / TLOG) if p.stat().st_size > 0] if path.is_dir() else [path]
+    if files and not any(p.stat().st_size for p in files):
+        raise Useless("it is empty")
     name = files[0].name.lower().removesuffix(".gz") if files else ""
     if name.endswith(".bin"):
         _steering_of_bin(path, bytes_of(path), series)

@@ -82,10 +82,12 @@ def _unless_elsewhere(chart: Chart, path: Path, box: Box) -> Chart:
 def _read(path: Path, box: Box, wanted: Wanted, *, positive: str = "auto", without_depths: bool = False) -> Chart:
     ending = path.suffix.lower()
     try:
-        with open_regular(path):
-            pass
+        with open_regular(path) as file:
+            is_empty = not file.read(1)
     except OSError as error:
         raise unreadable(str(path), error) from None
+    if is_empty:
+        raise InputError(str(path), "", "is empty", "fetch it again, or name another file")
     if re.fullmatch(r"\.\d{3}", ending):
         return _read_cell(path, box, wanted, without_depths=without_depths)
     if ending == ".asc":

@@ -172,10 +172,14 @@ def steering_in(paths: Sequence[Path]) -> Steering:
     from companion.errors import JobError
 
     logs, skipped = read_steering(logs_under(list(paths)))
+    takes = "give .BIN or .tlog of a voyage, or its folder"
+    if not logs and len(skipped) < 2:
+        name, why = (skipped[0].name, skipped[0].why) if skipped else (", ".join(map(str, paths)), "no log is in there")
+        raise JobError(f"{name}: {why}; {takes}")
     for left in skipped:
         print(f"skipped {left.name}: {left.why}", file=sys.stderr)
     if not logs:
-        raise JobError("none of the logs tells how the autopilot steered")
+        raise JobError(f"none of the logs tells how the autopilot steered; {takes}")
     return steering_of(logs)
 
 

@@ -101,6 +101,8 @@ def _example(args: argparse.Namespace) -> int:
     from companion import examples
     from companion.disk import Disk, reason
 
+    if args.folder.is_file():
+        raise InputError(str(args.folder), "", "is a file", "name a folder")
     missions = [examples.folder() / f"{name}.toml" for name in examples.NAMES]
     told = {path: path.read_text(encoding="utf-8") for path in missions}
     files = sorted(path for path in examples.folder().iterdir() if path.suffix in {".toml", ".wkt"})

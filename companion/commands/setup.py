@@ -159,6 +159,8 @@ def _room(folder: Path) -> None:
     from companion.disk import Disk
 
     if not folder.is_dir():
+        if folder.exists():
+            raise InputError(str(folder), "", "is no folder", "name another with --dir")
         raise InputError(str(folder), "", "no such folder", "make it, or name another with --dir")
     room = Disk().room(folder)
     if room.is_short:

@@ -115,6 +115,8 @@ class PassageFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
 
 def parse_passage(text: str, source: str) -> PassageFile:
     """Return the passage of a TOML text. Raises InputError: the key, what is wrong with it, and the nearest known."""
+    if not text.strip():
+        raise InputError(source, "", "is empty", "write [start], [goal] and [depart]: companion passage --help")
     try:
         raw = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:

@@ -120,6 +120,8 @@ def walk(data: bytes, source: str) -> Iterator[GribField]:
     """
     at = data.find(b"GRIB")
     if at < 0:
+        if not data:
+            raise InputError(source, "", "is empty", "fetch it again, or name another file")
         packed = {b"BZ": "bunzip2", b"\x1f\x8b": "gunzip", b"PK": "unzip"}.get(data[:2])
         if packed:
             raise InputError(source, "", "is compressed", f"unpack it first ({packed})")

@@ -289,7 +289,7 @@ def test_a_place_of_the_mission_that_is_not_in_free_water_is_told(shell):
     ("name", "text", "told"),
     [
         ("X.000", "not a cell at all, 24 bytes", "X.000: byte 0: is no S-57 cell: it is encrypted (S-63), or damaged"),
-        ("X.001", "", "X.001: is an update of a cell; name X.000: its updates are read with it"),
+        ("X.001", "x", "X.001: is an update of a cell; name X.000: its updates are read with it"),
         ("a.geojson", "{", "a.geojson: is no JSON"),
         ("a.geojson", "{}", "a.geojson: is no FeatureCollection; export it as GeoJSON (RFC 7946)"),
         (

@@ -24,6 +24,7 @@ from sitl.scenario.scenario import ExpectSpec, Scenario, WindSpec
 
 ROOT = Path(__file__).parents[2]
 PROBLEM = ROOT / "sailbench" / "problems"
+CHART = ("chart", "import", "--around", "50.8,-1.3", "--radius", "500", "--depth", "1")
 DAMAGES = {
     "missing": None,
     "empty": b"",
@@ -300,19 +301,54 @@ def test_on_a_full_disk_what_was_written_before_is_kept(short, tmp_path, monkeyp
     [
         (cli, ("fence", "check"), "empty.wkt", "export it again, or name another file"),
         (cli, ("mission", "new", "m.toml", "--from"), "empty.gpx", "export it again, or name another file"),
+        (cli, ("mission", "check"), "empty.toml", "companion mission example writes missions to begin from"),
+        (cli, ("plan",), "empty.toml", "companion mission example writes missions to begin from"),
+        (cli, ("passage", "plan"), "empty.toml", "write [start], [goal] and [depart]: companion passage --help"),
+        (cli, ("weather", "show"), "empty.grib", "fetch it again, or name another file"),
+        (cli, CHART, "empty.000", "fetch it again, or name another file"),
+        (cli, CHART, "empty.tif", "fetch it again, or name another file"),
+        (cli, CHART, "empty.geojson", "fetch it again, or name another file"),
         (sitl_cli, ("run",), "empty.toml", "name the TOML file of a mission or a scenario"),
         (sitl_cli, ("results", "show"), "empty.jsonl", "name another file"),
         (sitl_cli, ("results", "show"), "empty.parquet", "name another file"),
     ],
 )
 def test_an_empty_file_and_a_folder_are_called_so(tmp_path, monkeypatch, capsys, program, argv, name, remedy):
-    """They were no obstacles, no line of results, `Is a directory`."""
+    """They were no obstacles, no line of results, `Is a directory`, an encrypted cell, a mission without a goal."""
     monkeypatch.chdir(tmp_path)
     Path(name).touch()
     assert program.main([*argv, name]) == 2
     assert capsys.readouterr().err.endswith(f": {name}: is empty; {remedy}\n")
     assert program.main([*argv, "."]) == 2
     assert ": .: is a folder; name " in capsys.readouterr().err
+
+
+def test_a_file_in_place_of_a_folder_is_called_one(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("file").touch()
+    assert cli.main(["mission", "example", "file"]) == 2
+    assert capsys.readouterr().err == "companion mission: file: is a file; name a folder\n"
+    asked = ["--link", "udpin:127.0.0.1:1", "--start", "50.8170,-1.3100", "--goal", "50.8200,-1.3094"]
+    assert cli.main(["setup", "lake", "--dir", "file", *asked]) == 2
+    assert capsys.readouterr().err == "companion setup: file: is no folder; name another with --dir\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "why"),
+    [
+        ("a.BIN", b"", "it is empty"),
+        ("a.tlog", b"", "it is empty"),
+        ("a.BIN", b"what", "it is no .BIN log: it does not begin as one"),
+        ("a.txt", b"what", "only .BIN and .tlog tell how it was steered"),
+        ("", b"", "no log is in there"),
+    ],
+)
+def test_a_single_log_that_tells_no_steering_is_one_line(tmp_path, capsys, name, data, why):
+    if name:
+        (tmp_path / name).write_bytes(data)
+    assert cli.main(["doctor", "--log", str(tmp_path / name)]) == 1
+    told = f"companion doctor: {tmp_path / name}: {why}; give .BIN or .tlog of a voyage, or its folder\n"
+    assert capsys.readouterr().err == told
 
 
 def test_a_mission_that_is_to_be_a_folder_or_no_toml_is_told_with_a_remedy(tmp_path, monkeypatch, capsys):

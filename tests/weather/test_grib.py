@@ -117,7 +117,8 @@ MESSAGE = message_2(WIND_EAST, VALUES, LAT, LON)
 @pytest.mark.parametrize(
     ("data", "said"),
     [
-        (b"", "f.grb: holds no GRIB message; name a GRIB file (.grb, .grib2)"),
+        (b"", "f.grb: is empty; fetch it again, or name another file"),
+        (b"?", "f.grb: holds no GRIB message; name a GRIB file (.grb, .grib2)"),
         (b"BZh91AY", "f.grb: is compressed; unpack it first (bunzip2)"),
         (
             MESSAGE + MESSAGE[:100],

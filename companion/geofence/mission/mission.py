@@ -249,15 +249,21 @@ def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
             "companion run reads them there and sails them",
         )
     if not options.goal:
-        raise InputError(str(path), "goal", "is missing", GOAL_MISSING)
+        raise _without_goal(options, path)
     return assembled(options, path, given=given)
+
+
+def _without_goal(options: MissionOptions, path: Path) -> InputError:
+    if options == MissionOptions():
+        return InputError(str(path), "", "is empty", "companion mission example writes missions to begin from")
+    return InputError(str(path), "goal", "is missing", GOAL_MISSING)
 
 
 def read_course(path: Path) -> Mission:
     """Read a mission's goals and settings without its area, whose files may still have to be made."""
     options = _options_of(path, AS_IT_IS)
     if not options.goal:
-        raise InputError(str(path), "goal", "is missing", GOAL_MISSING)
+        raise _without_goal(options, path)
     bare = msgspec.structs.replace(options.area, obstacles=(), fence=None, drying=())
     return assembled(msgspec.structs.replace(options, area=bare), path)
 

@@ -14,7 +14,7 @@ import shapely
 
 from companion.boat.failed_tack import IRONS_S
 from companion.disk import read_regular
-from companion.errors import InputError
+from companion.errors import InputError, unreadable
 from companion.messages import Spread, Target
 from companion.planner.problem.parts import (
     FENCE,
@@ -164,7 +164,7 @@ def read_fields(source: str | Path | Mapping[str, Any]) -> dict[str, Any]:
         data = read_regular(path)
         raw = json.loads(data)
     except OSError as error:
-        raise InputError(str(path), "", f"cannot be read ({error.strerror})", "name a problem file") from error
+        raise unreadable(str(path), error, remedy="name a problem file") from error
     except (ValueError, RecursionError) as error:
         if not data.strip():
             raise InputError(str(path), "", "is empty", "name a problem file") from None
