@@ -134,7 +134,7 @@ def _gates_of(voyage: Voyage, area: AreaLike, approaches: tuple[Approach, ...]) 
         after = legs[i + 1].en_m if i + 1 < len(legs) else voyage.onward_en_m
         began = len(out)
         if goal.line is not None:
-            out.extend(_cross(goal, i, name, None if is_once_more else before, after, area))
+            out.extend(_cross(goal, i, name, None if is_once_more else before, after, area, _other_marks(voyage, goal)))
         elif goal.search is not None and approach is not None and approach.round > 0:
             out.extend(_sweep(goal, i, name, approach))
         elif goal.side is Side.NONE:
@@ -238,14 +238,26 @@ def _sweep(goal: Goal, index: int, name: str, approach: Approach) -> list[Gate]:
     ]
 
 
+def _other_marks(voyage: Voyage, goal: Goal) -> list[tuple[PointEn, float]]:
+    """Return the marks of all goals but a line's own, with what is kept clear of each [m]."""
+    own = () if goal.line is None else (goal.line.port_en_m, goal.line.starboard_en_m)
+    return [(mark.en_m, mark.keep_m) for mark in marks_of(voyage) if mark.en_m not in own]
+
+
 def _cross(
-    goal: Goal, index: int, name: str, before: PointEn | None, after: PointEn | None, area: AreaLike
+    goal: Goal,
+    index: int,
+    name: str,
+    before: PointEn | None,
+    after: PointEn | None,
+    area: AreaLike,
+    marks: list[tuple[PointEn, float]],
 ) -> list[Gate]:
     """Return the gates that cross a line: a place beyond it, and one before it where the way begins elsewhere."""
     line = goal.line
     assert line is not None
     way_m = 0.0 if before is None else distance_m(before, goal.en_m)
-    place, radius_m = place_beyond(line, crossing_en(line, before, after), area)
+    place, radius_m = place_beyond(line, crossing_en(line, before, after), area, marks)
     to = Gate(
         en_m=place,
         radius_m=radius_m,
@@ -259,7 +271,7 @@ def _cross(
     )
     if before is not None and ahead_m(line, before) <= -0.5 * BEFORE_M:
         return [to]
-    place, radius_m = place_before(line, foot_en(line, place), area)
+    place, radius_m = place_before(line, foot_en(line, place), area, marks)
     return [
         replace(to, en_m=place, radius_m=radius_m, ends_goal=False, keep_out=(), is_before_line=True),
         replace(to, from_en_m=place, is_first=False),

@@ -9,9 +9,11 @@ lie nearer to the line, or to one side along it: as far off as there is room for
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.skipper.way.geometry import Barrier, along_m, barrier, bearing_rad, cross_track_m, distance_m, moved
 from companion.skipper.way.voyage import AreaLike, Line, PointEn
@@ -112,28 +114,32 @@ def foot_en(line: Line, point: PointEn) -> PointEn:
     return _on_line(line, along_m(point, line.port_en_m, line.starboard_en_m))
 
 
-def place_beyond(line: Line, cut_en: PointEn, area: AreaLike) -> tuple[PointEn, float]:
+Marks = Sequence[tuple[PointEn, float]]
+"""Marks of other goals: where each is, and how far every way keeps clear of it [m]."""
+
+
+def place_beyond(line: Line, cut_en: PointEn, area: AreaLike, marks: Marks = ()) -> tuple[PointEn, float]:
     """Return the place beyond the line that the way across it at ``cut_en`` leads to, and its radius [m]."""
-    place, off_m = _place(line, cut_en, area, course_rad(line), BEYOND_M, BEYOND_LEAST_M)
+    place, off_m = _place(line, cut_en, area, marks, course_rad(line), BEYOND_M, BEYOND_LEAST_M)
     return place, min(BEYOND_RADIUS_M, RADIUS_SHARE * off_m)
 
 
-def place_before(line: Line, cut_en: PointEn, area: AreaLike) -> tuple[PointEn, float]:
+def place_before(line: Line, cut_en: PointEn, area: AreaLike, marks: Marks = ()) -> tuple[PointEn, float]:
     """Return the place before the line where the way across it at ``cut_en`` begins, and its radius [m]."""
-    place, off_m = _place(line, cut_en, area, course_rad(line) + math.pi, BEFORE_M, BEFORE_LEAST_M)
+    place, off_m = _place(line, cut_en, area, marks, course_rad(line) + math.pi, BEFORE_M, BEFORE_LEAST_M)
     return place, min(BEFORE_RADIUS_M, RADIUS_SHARE * off_m)
 
 
 def _place(
-    line: Line, cut_en: PointEn, area: AreaLike, course: float, most_m: float, least_m: float
+    line: Line, cut_en: PointEn, area: AreaLike, marks: Marks, course: float, most_m: float, least_m: float
 ) -> tuple[PointEn, float]:
     """Return a place off the line, and how far off: as far as there is room for the line's margin, up to ``most_m``.
 
-    Not where something solid lies between it and the line. Where nothing fits, the roomiest place: the ladder's lower
-    steps lead there.
+    ``marks`` are as much in its way as what is solid. Not where something solid lies between it and the line. Where
+    nothing fits, the roomiest place: the ladder's lower steps lead there.
     """
     wanted, (low_m, high_m) = moved(cut_en, course, most_m), _opening_m(line)
-    if area.spare_m([wanted], line.margin_m)[0] >= 0.0 and area.path_clearance_m([cut_en, wanted]) > 0.0:
+    if _spare_m(line, [wanted], area, marks)[0] >= 0.0 and area.path_clearance_m([cut_en, wanted]) > 0.0:
         return wanted, most_m
     cut_m = along_m(cut_en, line.port_en_m, line.starboard_en_m)
     step_m = max(ASIDE_M, width_m(line) / ASIDES)
@@ -145,13 +151,19 @@ def _place(
     ]
     tried.sort(key=lambda one: -one[0])
     places = [moved(foot, course, off_m) for _, off_m, foot in tried]
-    spare_m = area.spare_m(places, line.margin_m)
+    spare_m = _spare_m(line, places, area, marks)
     # What fits, the best first; then the others, the roomiest first.
     order = sorted(range(len(tried)), key=lambda n: -min(0.0, round(float(spare_m[n]) / ROOM_M)))
     for n in order:
         if area.path_clearance_m([tried[n][2], places[n]]) > 0.0:
             return places[n], tried[n][1]
     return wanted, most_m
+
+
+def _spare_m(line: Line, places: Sequence[PointEn], area: AreaLike, marks: Marks) -> NDArray[np.float64]:
+    """Return how much farther off each place is than is kept clear of what is solid and of ``marks`` [m]."""
+    off = [[distance_m(place, en) - keep_m - ROOM_M for en, keep_m in marks] for place in places]
+    return np.minimum(area.spare_m(places, line.margin_m), [min(row, default=math.inf) for row in off])
 
 
 def no_room_words(line: Line, name: str, place_en: PointEn, area: AreaLike, margin_m: float) -> str:

@@ -196,6 +196,15 @@ def test_where_it_is_roomier_to_one_side_along_the_line_it_is_crossed_there():
     assert float(water.spare_m([across.en_m], 8.0)[0]) >= 0.0
 
 
+def test_the_place_beyond_keeps_clear_of_the_marks_of_another_line():
+    """Two gates 20 m apart: the place lay 7.8 m from a mark of the other, and 8 m are kept clear of it."""
+    first = goal(NORTHWARD)
+    second = goal(Line(port_en_m=(6.0, 112.0), starboard_en_m=(36.0, 112.0), keep_m=5.0))
+    made = voyage(first, second)
+    off = [distance_m(gate.en_m, mark.en_m) - mark.keep_m for gate in gates_of(made) for mark in marks_of(made)]
+    assert min(off) >= 0.0
+
+
 def test_with_a_mark_on_the_bank_it_is_crossed_off_the_bank():
     bank = shapely.box(-200.0, 0.0, -20.0, 200.0)
     (across,), water = beside(bank, approach=Approach(goal=0, en_m=(-15.0, 0.0)))
