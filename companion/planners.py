@@ -55,7 +55,7 @@ class AstarSettings:
     """A*'s numbers; the defaults are those the thesis ends with (5.3: no tunnel, no extra tack cost).
 
     Attributes:
-        grid_m: GRID SIZE [m]; None: a fortieth of the distance.
+        grid_m: GRID SIZE [m]; None: a fortieth of the distance, not below 2 m, and coarser where that does not fit.
         room_m: How far beyond start and goal the grid reaches at the least [m], where no fence ends it; None: half
             the distance, in which a boat between two gates of a buoy has no room to tack.
         turn_s_per_rad: f of eq. 4.4 [s/rad]; 0 for Figure 5.1.
@@ -69,7 +69,7 @@ class AstarSettings:
         max_turn_rad: The greatest heading change from step to step (4.1.1). With his 90 degrees there is no tack
             unless the wind blows along the grid and the no-go zone is not widened: it gybes round.
         ship_match_s: Tolerance of eq. 4.7 [s].
-        memory_bytes: What the grid may take.
+        memory_bytes: What the grid may take; one that is asked for and takes more is refused.
         projection: ``local``: planned in the problem's metres; ``flat``: in those of eq. 4.2 (docs/lab/frames.md).
         origin: Where the problem's metres count from; the flat projection needs it (``PlannerChoice.about``).
         goal_heading: ``bearing``: the goal is a place and a heading, nearest to the bearing from start to goal;

@@ -12,7 +12,8 @@ of a cell off the start's row or column counts as on it, and the last leg makes 
 the first turn may exceed 90 degrees; a problem's own limits and its widened no-go zone narrow the range of
 headings further, and in a current so do the courses that the autopilot does not follow (``zone``); a boat faster
 than 7 knots is estimated at its own top speed, or the estimate would overestimate.
-The grid refuses to be larger than ``memory_bytes``, the weak spot that the thesis names in its conclusion.
+A grid that is asked for refuses to be larger than ``memory_bytes``, the weak spot that the thesis names in its
+conclusion; the default is laid as coarse as fits.
 
 References:
     [1] G.-A. Büsser, Design and Implementation of a Navigation Algorithm for an Autonomous Sailboat, 2009.
@@ -173,6 +174,8 @@ def _room_m(p: Problem) -> float:
 
 
 CELLS_ACROSS = 40  # of the default grid, start to goal: 20 m for the 800 m legs that AVALON was tested on
+LEAST_M = 2.0  # of a cell of the default grid: a finer one says nothing more of a boat, and takes a plan's whole time
+COARSER = 1.1  # from one try to the next, at the least: start and goal are nodes, so that cells shrink by jumps
 STATE_BYTES = 8 + 8 + 4 + 1 + 2 * 12  # cost, clock, parent, closed, and room for two heap entries
 CHUNK = 2000
 BORDER_S = 60.0  # of each step outside a tunnel with borders: a tack is worth it, a long board is not
@@ -235,6 +238,16 @@ def grid_of(problem: Problem, grid_m: float, room_m: float | None = None) -> Nod
         start=start_row * columns + start_column,
         goal=goal_row * columns + goal_column,
     )
+
+
+def _default_grid(problem: Problem, settings: AstarSettings) -> tuple[float, NodeGrid]:
+    """Return the default spacing [m] and its grid: a fortieth of the distance, or as fine as is sensible and fits."""
+    grid_m = max(math.dist(problem.start_en, problem.goal_en) / CELLS_ACROSS, LEAST_M)
+    grid = grid_of(problem, grid_m, settings.room_m)
+    while grid.memory_bytes > settings.memory_bytes:
+        grid_m *= max(COARSER, math.sqrt(grid.memory_bytes / settings.memory_bytes))
+        grid = grid_of(problem, grid_m, settings.room_m)
+    return grid_m, grid
 
 
 def steps_of(grid: NodeGrid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -314,8 +327,11 @@ def search(
     if distance_m <= problem.goal_radius_m:
         effort.found()
         return Outcome(waypoints_en=np.array([problem.start_en]))
-    grid_m = settings.grid_m if settings.grid_m is not None else distance_m / CELLS_ACROSS
-    grid = grid_of(problem, grid_m, settings.room_m)
+    grid_m = settings.grid_m
+    if grid_m is None:
+        grid_m, grid = _default_grid(problem, settings)
+    else:
+        grid = grid_of(problem, grid_m, settings.room_m)
     trace: dict[str, Any] = {"grid_m": grid_m, "columns": grid.columns, "rows": grid.rows}
     if grid.memory_bytes > settings.memory_bytes:
         fits = grid_m * math.sqrt(grid.memory_bytes / settings.memory_bytes)

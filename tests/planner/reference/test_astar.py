@@ -250,6 +250,32 @@ def test_the_grid_refuses_to_grow_past_its_memory_and_says_what_would_fit():
     assert grid.memory_bytes <= AstarSettings().memory_bytes
 
 
+def square(side_m):
+    return shapely.box(-0.5 * side_m, -0.5 * side_m, 0.5 * side_m, 0.5 * side_m).wkt
+
+
+@pytest.mark.parametrize(
+    ("goal", "side_m", "cell_m"),
+    [((0, 800), 2000.0, 20.0), ((15, 0), 400.0, 2.0), ((15, 1), 400.0, 2.0), ((60, 0), 2000.0, 3.4)],
+)
+def test_the_default_grid_is_as_fine_as_is_sensible_and_fits(goal, side_m, cell_m):
+    """Between two gates of a buoy, 15 m apart, a fortieth of the distance asked for 687 MB: no such leg was planned."""
+    p = problem(goal={"x": goal[0], "y": goal[1], "radius": 3}, fence=square(side_m))
+    outcome, found = run(p)
+    assert outcome.trace["grid_m"] == pytest.approx(cell_m, rel=0.1)
+    assert found is not None, outcome.reason
+    assert found.is_feasible
+
+
+def test_a_default_grid_fits_whatever_the_water_and_one_that_is_asked_for_is_not_coarsened():
+    for goal in ((15, 0.1), (15, 15), (3, 0)):
+        p = problem(goal={"x": goal[0], "y": goal[1], "radius": 2}, fence=square(20_000.0))
+        outcome, _ = run(p, memory_bytes=20_000_000)
+        assert "MB allowed" not in outcome.reason
+        assert outcome.trace["columns"] * outcome.trace["rows"] * 16 * 45 <= 20_000_000
+    assert "MB allowed" in run(p, grid_m=2.0)[0].reason
+
+
 def test_a_ship_is_a_disc_where_it_would_be_met():
     ship = {"x": -400, "y": 400, "vx": 3.0, "vy": 0.0, "radius_m": 60}
     p = problem(wind={"from_deg": 90, "speed_mps": 5, "sigma": {"model": "none"}}, targets=[ship])
