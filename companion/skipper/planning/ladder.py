@@ -2,7 +2,7 @@
 
 The first thing is a planner of somebody's choice: what it does not find is looked for by ``auto``.
 
-Each rung is named in the status and in the decision record. The old plan is looked at before the first rung, a
+Each rung is named in the status and in the decision record. The old plan is looked at before anything is given up, a
 repaired start belongs to every rung, and after the last the boat holds in a safe loiter and waits, longer each time.
 """
 
@@ -29,6 +29,11 @@ class Rung:
     pinches: bool = False
 
 
+def first_of_auto(config: SkipperConfig) -> int:
+    """Return the number of the first step by ``auto``: up to it nothing is given up."""
+    return int(config.planner.algorithm != AUTO.algorithm)
+
+
 def rungs(config: SkipperConfig, *, track_m: float = 0.0, in_current: bool = False) -> tuple[Rung, ...]:
     """Return the steps in order; the first is what was asked for, none is below the margin's floor and ``track_m``.
 
@@ -42,7 +47,7 @@ def rungs(config: SkipperConfig, *, track_m: float = 0.0, in_current: bool = Fal
     floor = min(config.margin_floor_m + track_m, config.margin_m)
     room = config.margin_m - floor
     out = [Rung(name="", margin_m=config.margin_m, delta_s=config.delta_s, max_path_risk=limit, planner=config.planner)]
-    if config.planner.algorithm != AUTO.algorithm:
+    if first_of_auto(config):
         out.append(replace(out[0], name=f"planner {AUTO.algorithm}", planner=AUTO))
     needed = min(config.margin_floor_m, config.margin_m) + track_m
     if needed > config.margin_m:

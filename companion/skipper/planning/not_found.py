@@ -10,6 +10,7 @@ from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
 from companion.skipper.planning.asking import request
 from companion.skipper.planning.diversions import LACK_M, diversion, held_at, is_led_to, room_lacking_m
+from companion.skipper.planning.ladder import first_of_auto
 from companion.skipper.planning.tides import closes_ahead, opens_next
 from companion.skipper.planning.track import of_way, steps
 from companion.skipper.planning.uploads import is_on_board_sound, is_sound, is_way_clear, leads_there, too_risky, upload
@@ -109,17 +110,19 @@ def _stays_as_it_is(ctx: StepContext, pending: PendingPlan) -> str:
 def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
     """Keep the old plan while it is sound, else take the next step of the ladder, at last hold.
 
+    What a planner of somebody's choice does not find is looked for by ``auto`` before either: that costs nothing.
     One that leads elsewhere than she is bound for, to the goals instead of a refuge, or that ends short of them where a
     loiter has too little room, is kept at the ladder's end only.
     """
-    ladder = steps(ctx)
+    ladder, first = steps(ctx), first_of_auto(ctx.config)
     state = ctx.state
-    where = ladder[min(pending.rung, len(ladder) - 1)].name or "as configured"
+    if pending.rung < first and _is_climbed(ctx, pending, reason, from_index=pending.from_index):
+        return
     met = meetings(ctx) if state.mission.route is not None else ()
     is_last, is_cramped = pending.rung + 1 >= len(ladder), _ends_cramped(ctx, pending)
     is_to_stay = _is_bound_alike(ctx) and not is_cramped
     if (
-        ((pending.rung == 0 and is_to_stay) or (is_last and not is_to_stay) or leads_there(ctx, pending))
+        ((pending.rung <= first and is_to_stay) or (is_last and not is_to_stay) or leads_there(ctx, pending))
         and state.mission.route is not None
         and not met
         and is_on_board_sound(ctx)
@@ -134,14 +137,10 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         _wait_against(ctx, pending, foul, count=len(ladder))
         return
     # Only the boat's own place helps when the way from a waypoint ahead is closed: the rungs start at the boat.
-    keeps = is_cramped or (pending.rung == 0 and state.mission.route is not None and _tail_only(ctx))
+    keeps = is_cramped or (pending.rung <= first and state.mission.route is not None and _tail_only(ctx))
     from_index = pending.from_index if keeps else None
-    if pending.rung + 1 < len(ladder):
-        following = ladder[pending.rung + 1].name
-        text = f"no plan {where} ({reason}): trying {following}"
-        ctx.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
-        if request(ctx, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason):
-            return
+    if _is_climbed(ctx, pending, reason, from_index=from_index):
+        return
     ctx.set(plans=changed(ctx.state.plans, retry=ctx.failed(state.plans.retry), rung=0))
     stays = "" if met else _stays_as_it_is(ctx, pending)
     if stays:
@@ -182,6 +181,17 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         every_s=0.0,
     )
     hold(ctx, f"no plan found: {reason}")
+
+
+def _is_climbed(ctx: StepContext, pending: PendingPlan, reason: str, *, from_index: int | None) -> bool:
+    """Ask for a plan by the ladder's next step, and say so; False: there is none, or it cannot be asked for."""
+    ladder = steps(ctx)
+    if pending.rung + 1 >= len(ladder):
+        return False
+    where, following = ladder[pending.rung].name or "as configured", ladder[pending.rung + 1].name
+    text = f"no plan {where} ({reason}): trying {following}"
+    ctx.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
+    return request(ctx, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason)
 
 
 def _is_bound_alike(ctx: StepContext) -> bool:

@@ -16,6 +16,7 @@ from itertools import pairwise
 from companion.geo.angles import difference_rad
 from companion.messages import Target
 from companion.planner.problem import VESSELS_SHARE, sigmas_for, vessel_count
+from companion.skipper.planning.ladder import first_of_auto
 from companion.skipper.planning.right_of_way import MEET_SHARE, bow_discs, held_of, is_stood_on_to, regions
 from companion.skipper.step.context import StepContext
 from companion.skipper.way import PointEn, bearing_rad, distance_m
@@ -191,7 +192,7 @@ def shares(ctx: StepContext, start_en: PointEn, after_s: float, rung: int, delta
             out.append(replace(target, radius_m=radius_m))
     if not out:
         return Shares(targets=(), delta_s=delta_s, wind_delta_s=delta_s, part=None)
-    if rung == 0 and ctx.state.traffic.encounters:
+    if rung <= first_of_auto(ctx.config) and ctx.state.traffic.encounters:
         out += regions(ctx, vessels, start_en, after_s, is_met=is_met)
     least = max(LEAST_DELTA_S, 1.0 - of_wind - part)  # a half and not the last digit below it
     return Shares(targets=tuple(out), delta_s=least, wind_delta_s=1.0 - of_wind, part=part)

@@ -17,6 +17,7 @@ from companion.messages import Mode
 from companion.orders import Verb
 from companion.planner import plan
 from companion.planner.track import ExpectedTrack
+from companion.planners import PlannerChoice
 from companion.skipper.behaviors.helm import leave_passed, push_on
 from companion.skipper.intake import locate
 from companion.skipper.planning.answers import _told_m, take_plan
@@ -391,6 +392,22 @@ def test_a_sound_way_that_leads_elsewhere_than_she_is_bound_for_is_kept_at_the_l
     assert ("the old one is sound and stays" in says) is stays
     assert any(isinstance(a, RequestPlan) for a in ctx.actions) is not stays
     assert not uploads(ctx.actions)
+
+
+@pytest.mark.parametrize(("rung", "asks"), [(0, "planner auto"), (1, None)])
+def test_what_the_chosen_planner_does_not_find_auto_is_asked_for_though_the_way_on_board_is_sound(rung, asks):
+    """By A* no leg between the gates of a buoy was found; "the old one is sound and stays", and auto was not asked."""
+    way = route((0.0, 100.0), (0.0, 200.0), (0.0, 200.0))
+    config = {"planner": PlannerChoice(algorithm="astar")}
+    ctx = moment(way, heading_deg=0.0, twd_deg=90.0, config=config)
+    assert request(ctx, ReplanReason.NEXT_GOAL, from_index=0, rung=rung)
+    ctx.actions.clear()
+    not_found(ctx, ctx.state.pending.plan, "none")
+    [says] = [a.text for a in ctx.actions if isinstance(a, Announce)]
+    asked = [(a.rung, a.planner.algorithm, a.from_seq) for a in ctx.actions if isinstance(a, RequestPlan)]
+    assert asked == ([] if asks is None else [(asks, "auto", 1)])  # from the same place, with nothing given up
+    wanted = "the old one is sound and stays" if asks is None else "no plan as configured (none): trying planner auto"
+    assert wanted in says
 
 
 @pytest.mark.parametrize(

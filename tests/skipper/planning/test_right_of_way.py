@@ -8,6 +8,7 @@ import pytest
 from companion.boat import Boat, constant
 from companion.geo.angles import difference_rad
 from companion.messages import Severity
+from companion.planners import PlannerChoice
 from companion.skipper.planning.diversions import announcement
 from companion.skipper.planning.right_of_way import bow_discs, regions, stands_on
 from companion.skipper.planning.vessels import meetings, near, shares
@@ -118,6 +119,14 @@ def test_the_same_ship_is_kept_clear_of_by_default():
     assert not said(ctx)
     assert meetings(ctx)
     assert {t.name for t in shares(ctx, ctx.boat_en, 0.0, 0, 0.9).targets} == {"211000001"}
+
+
+@pytest.mark.parametrize(("planner", "rung", "is_kept"), [("auto", 1, False), ("astar", 1, True), ("astar", 2, False)])
+def test_the_water_that_the_rules_close_is_closed_until_something_is_given_up(planner, rung, is_kept):
+    ctx = turn_with(FISHING)
+    ctx.config = replace(ctx.config, planner=PlannerChoice(algorithm=planner))
+    names = {t.name for t in shares(ctx, ctx.boat_en, 0.0, rung, 0.9).targets}
+    assert ("ahead of 211000001" in names) is is_kept
 
 
 def test_giving_way_closes_the_water_ahead_of_her_bow_and_our_old_course():
