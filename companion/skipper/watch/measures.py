@@ -9,7 +9,7 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.geo.angles import difference_rad
 from companion.messages import Severity
-from companion.safety import BY_NAME, JUMP_M, STOPPING
+from companion.safety import BY_NAME, JUMP_M, STOPPING, Watchdog
 from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.behaviors.shoaling import depth_ahead_m
@@ -49,6 +49,8 @@ IRONS_TWA_RAD = math.radians(35.0)
 IRONS_TWS_MPS = 1.5  # less wind than this is a calm, not irons
 MOVING_MPS = 0.5
 PROGRESS_WINDOW_S = 180.0
+FIELDS_SHARE = 0.05  # of what she could sail in the window: by field less made good than this is none
+CLEAR_SHARE = 1.5  # ... and this many times as much is progress again
 RISE = 0.015  # it is charged; the last percent trembles
 FALL = 0.05  # the rate is told when the charge has fallen by this much ...
 LOOK_S = 300.0  # ... and for this long
@@ -65,6 +67,20 @@ def measure(ctx: StepContext, name: str) -> float | None:
     if dog.sensor:
         return ctx.autopilot.sensor(dog.sensor) if ctx.autopilot is not None else None
     return _MEASURES[name](ctx)
+
+
+def as_watched(ctx: StepContext, dog: Watchdog) -> Watchdog:
+    """Return a row of the table with its thresholds as they are now.
+
+    By field, circles before a barrier creep: a boat that sails 3 m/s about a place and is set 25 m on in three minutes
+    makes no way there. A few metres of a boat that is led along her plan's legs are way made good.
+    """
+    wind = ctx.wind_mean
+    if dog.name != "no progress" or wind is None or not ctx.is_field_steered:
+        return dog
+    could_mps = max(0.0, ctx.voyage.boat.polar.max_speed_mps(wind[1]) - math.hypot(*ctx.current_en_mps))
+    least_m = FIELDS_SHARE * could_mps * PROGRESS_WINDOW_S
+    return replace(dog, enter=max(dog.enter, least_m), exit=max(dog.exit, CLEAR_SHARE * least_m))
 
 
 def _flag(value: bool | None) -> float | None:

@@ -18,7 +18,7 @@ from companion.skipper.planning.fallback import may_fall_back
 from companion.skipper.planning.vessels import lies_at_goal
 from companion.skipper.step import SkipperConfig, StepContext
 from companion.skipper.step.state import Raised
-from companion.skipper.watch.measures import measure
+from companion.skipper.watch.measures import as_watched, measure
 from companion.skipper.way.drift import DriftAhead, drift_ahead
 from companion.skipper.way.shoals import beyond_words
 from companion.skipper.way.voyage import PointEn, outside_m, water_at
@@ -255,7 +255,8 @@ def watch(ctx: StepContext) -> None:
     raised = {r.name: r for r in ctx.state.alarms.raised}
     entering = dict(ctx.state.alarms.entering)
     fresh: list[str] = []
-    for dog in TABLE:
+    for row in TABLE:
+        dog = as_watched(ctx, row)
         value = measure(ctx, dog.name) if _is_watched(ctx, dog) else None
         above = dog.enter >= dog.exit  # the figure is bad when it is large
         enters = value is not None and (value >= dog.enter if above else value <= dog.enter)

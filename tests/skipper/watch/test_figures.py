@@ -15,10 +15,11 @@ from companion.skipper.intake import locate
 from companion.skipper.planning.diversions import diversion
 from companion.skipper.step.config import ALL_PERMITTED, Ends, Guidance
 from companion.skipper.step.context import StepContext
-from companion.skipper.step.snapshot import WindEstimate, WindHealth
+from companion.skipper.step.snapshot import WaterCurrent, WindEstimate, WindHealth
 from companion.skipper.step.state import Charge, Fix
 from companion.skipper.watch import measures
 from companion.skipper.watch.measures import corridor_m, follow_charge, lasts_s, measure, sun_height_rad, way_s
+from companion.skipper.watch.watch import watch
 from companion.skipper.way.position_plausibility import PositionDoubt
 from tests.skipper.moments import NOW_S, moment, route
 from tests.skipper.world import FRAME, with_parts
@@ -158,6 +159,29 @@ def test_a_new_plan_every_quarter_of_a_minute_is_no_progress_and_hides_none(guid
     assert measure(ctx, "no progress") == 30.0
     is_moved = ctx.state.progress.history[-1][3] != 470.0  # by what the new plan is longer; a field follows none
     assert is_moved is (guidance is Guidance.PLAN)
+
+
+@pytest.mark.parametrize(
+    ("guidance", "made_m", "tws_mps", "drift_mps", "is_raised"),
+    [
+        (Guidance.FIELD, 20.0, 5.0, 0.0, True),
+        (Guidance.FIELD, 20.0, 5.0, 2.0, False),  # against a current it is much
+        (Guidance.FIELD, 20.0, 1.0, 0.0, False),  # and in a light wind
+        (Guidance.FIELD, 60.0, 5.0, 0.0, False),
+        (Guidance.PLAN, 20.0, 5.0, 0.0, False),
+        (Guidance.PLAN, 4.0, 5.0, 0.0, True),
+    ],
+)
+def test_by_field_a_boat_that_creeps_in_circles_makes_no_progress(guidance, made_m, tws_mps, drift_mps, is_raised):
+    """Before a buoy to leeward she turned circles for four minutes: they crept, and 31 m in 170 s were progress."""
+    guided = replace(moment().autopilot, mode=Mode.GUIDED if guidance is Guidance.FIELD else Mode.AUTO)
+    seen = {"autopilot": guided, "current": WaterCurrent(east_mps=drift_mps, is_significant=drift_mps > 0.0)}
+    config = {"guidance": guidance}
+    ctx = moment(
+        WAY, config=config, tws_mps=tws_mps, seen=seen, steering={"own_mode": guided.mode}, **history(made_m=made_m)
+    )
+    watch(ctx)
+    assert ctx.is_raised("no progress") is is_raised
 
 
 @pytest.mark.parametrize(("speed_mps", "off_deg"), [(0.49, 0.0), (0.51, 30.0)])
