@@ -140,7 +140,8 @@ class SimulatedWorld:
     status_s: list[float] = field(default_factory=list)
     alerts: dict[str, int] = field(default_factory=dict)
     errors: list[str] = field(default_factory=list)
-    summary: dict[str, Any] = field(default_factory=dict)
+    summary: dict[str, Any] = field(default_factory=dict)  # of the last life
+    lives: list[dict[str, Any]] = field(default_factory=list)  # the summary that each left
     set_sail_s: float | None = None
     planner: FaultyPlanner | KillablePlanner = field(default_factory=FaultyPlanner)
     disk: FaultyDisk = field(default_factory=FaultyDisk)

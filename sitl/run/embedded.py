@@ -10,7 +10,7 @@ import contextlib
 import json
 import math
 import traceback
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -36,7 +36,7 @@ from companion.mission_check import require_sailable
 from companion.page import Address
 from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce
-from companion.telemetry.folder import STATE, VERDICT
+from companion.telemetry.folder import STATE, SUMMARY, VERDICT
 from companion.wind import Estimator, WindTracker
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.faults import (
@@ -257,7 +257,7 @@ async def run_embedded(
         terms_of(scenario, mission, seed),
         world.truth,
         Told(
-            summary=world.summary,
+            summary=of_all_lives(world.summary, world.lives),
             alerts=world.alerts,
             errors=world.errors,
             status_times_s=world.status_s,
@@ -356,9 +356,9 @@ async def _sail_and_restart(
         done, _ = await asyncio.wait([task], timeout=None if kill is None else max(0.0, kill.at_s - now_s()))
         if task not in done:
             task.cancel()
-        gave_up = False
+        gave_up, ended = False, None
         try:
-            world.summary = await task
+            ended = world.summary = await task
         except asyncio.CancelledError:
             pass
         except Exception as error:
@@ -368,7 +368,7 @@ async def _sail_and_restart(
             gave_up = True
         if world.observer is not None:
             world.observer.life(born_s, now_s())
-        _collect_alerts(world, folder)
+        _collect(world, folder, ended)
         if gave_up:
             if kill is not None:
                 kills.insert(0, kill)
@@ -409,13 +409,33 @@ async def _one_life(planner: FaultyPlanner | KillablePlanner, voyage: Coroutine[
         return await voyage
 
 
-def _collect_alerts(world: SimulatedWorld, folder: Path) -> None:
+def _collect(world: SimulatedWorld, folder: Path, summary: dict[str, Any] | None) -> None:
+    """Take what a life that has ended told, by its summary or, where it was killed, by the file that the next rewrites.
+
+    Its alerts are those of the file.
+    """
     try:
-        summary = json.loads((folder / "summary.json").read_bytes())
+        filed = json.loads((folder / SUMMARY).read_bytes())
     except (OSError, ValueError):
-        return
-    for code, count in summary.get("alerts", {}).items():
+        filed = {}
+    world.lives.append(summary or filed)
+    for code, count in filed.get("alerts", {}).items():
         world.alerts[code] = world.alerts.get(code, 0) + count
+
+
+# Of all lives of a companion, what its last one's summary counts from its own start.
+_OF_ALL: dict[str, Callable[[Sequence[Any]], Any]] = {
+    "replans": sum,
+    "no_go_entries": sum,
+    "promised_risk": max,
+    "promised_clearance_m": min,
+}
+
+
+def of_all_lives(last: Mapping[str, Any], lives: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the last life's summary with what a verdict tells of the whole voyage: counts, and the worst promises."""
+    told = {key: [life[key] for life in lives if life.get(key) is not None] for key in _OF_ALL}
+    return {**last, **{key: _OF_ALL[key](values) for key, values in told.items() if values}}
 
 
 async def _watch_truth(world: SimulatedWorld, frame: LocalFrame, limit_s: float) -> None:

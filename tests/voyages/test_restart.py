@@ -164,13 +164,16 @@ def test_killed_at_two_hundred_moments(calm_voyages, tmp_path):
 
 
 def test_a_torn_voyage_can_be_read_and_replayed(tmp_path):
-    verdict, _ = sail(tmp_path, kill_at_s=70.0, torn=random.Random(5))
+    verdict, _ = sail(tmp_path, kill_at_s=100.0, torn=random.Random(5))
     assert verdict.passed, verdict.checks
     rows = (tmp_path / "track.csv").read_text().splitlines()
     assert {row.count(",") for row in rows} == {rows[0].count(",")}
     report = replay(tmp_path)
     assert report.restarts == 1
     assert report.steps > 100
+    asked = [d["t_s"] for d in decisions(tmp_path) if d.get("action") == "RequestPlan" and d["reason"] != "start"]
+    assert asked[0] < 100.0 < asked[-1]
+    assert verdict.figures["replans"] == len(asked)  # of both lives
 
 
 def stale(folder):
