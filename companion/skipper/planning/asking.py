@@ -280,10 +280,11 @@ def _aim(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) ->
     if step.nearer_goal:
         return _nearer(ctx, target, gate, start, step)
     aim = aim_at(ctx.voyage, ctx.config, target, gate, start.en_m)
-    if gate >= 0 or aim.en_m != target.en_m:
+    if aim.en_m != target.en_m or (gate >= 0 and not target.is_plain):
         return aim
-    # Home is where she was armed, by a quay: the plan ends as near to it as it may.
-    return aim_near(ctx.to_stay_in.area, ctx.config, target.en_m, target.radius_m, step.margin_m) or aim
+    # Home is where she was armed, by a quay, and a goal may lie by one: the plan ends as near to it as it may.
+    area = ctx.voyage.area if gate >= 0 else ctx.to_stay_in.area
+    return aim_near(area, ctx.config, target.en_m, target.radius_m, step.margin_m, gate=gate) or aim
 
 
 def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:

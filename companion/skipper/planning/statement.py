@@ -286,17 +286,27 @@ def _inner_m(config: SkipperConfig, radius_m: float) -> float:
     return max(radius_m - config.announce_m, 0.2 * radius_m)
 
 
-def aim_near(area: AreaLike, config: SkipperConfig, en_m: PointEn, radius_m: float, margin_m: float) -> Aim | None:
-    """Return an aim within ``radius_m`` of a place that completes nothing, the nearest that keeps a margin, or None."""
+def aim_near(
+    area: AreaLike, config: SkipperConfig, en_m: PointEn, radius_m: float, margin_m: float, *, gate: int = -1
+) -> Aim | None:
+    """Return an aim within ``radius_m`` of a place, the nearest that keeps a margin as it is drawn, or None.
+
+    It completes the gate ``gate``, where there is one: anywhere inside its radius then, which is what counts. Where it
+    completes none, a loiter follows there. What lies between the two is free: it is not beyond a mole.
+    """
     inner_m = _inner_m(config, radius_m)
-    if float(area.clearance_m([en_m])[0]) >= margin_m:
-        return Aim(en_m=en_m, radius_m=inner_m, gate=-1)
-    for share in NEAR_SHARES:
-        ring = [moved(en_m, 2.0 * math.pi * n / NEAR_COUNT, share * inner_m) for n in range(NEAR_COUNT)]
-        rooms_m = area.clearance_m(ring)
-        best = int(np.argmax(rooms_m))
-        if rooms_m[best] >= margin_m:
-            return Aim(en_m=ring[best], radius_m=(1.0 - share) * inner_m, gate=-1)
+    lack_m = -float(area.spare_m([en_m], margin_m)[0])
+    if lack_m <= 0.0:
+        return Aim(en_m=en_m, radius_m=inner_m, gate=gate)
+    most_m = radius_m if gate >= 0 else inner_m
+    offs_m = {lack_m + HAIR_M, *(share * inner_m for share in NEAR_SHARES), *(share * most_m for share in NEAR_SHARES)}
+    for off_m in sorted(off_m for off_m in offs_m if lack_m < off_m < most_m):
+        ring = [moved(en_m, 2.0 * math.pi * n / NEAR_COUNT, off_m) for n in range(NEAR_COUNT)]
+        spare_m = area.spare_m(ring, margin_m)
+        for n in np.argsort(-spare_m, kind="stable"):
+            if spare_m[n] >= 0.0 and area.path_clearance_m([en_m, ring[n]]) > 0.0:
+                left_m = max(inner_m - off_m, NEAR_SHARES[0] * (most_m - off_m))
+                return Aim(en_m=ring[n], radius_m=left_m, gate=gate)
     return None
 
 

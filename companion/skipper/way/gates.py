@@ -107,6 +107,11 @@ class Gate:
         """Whether it is passed by crossing its line, and not by coming near."""
         return self.line is not None and not self.is_before_line
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a place that is passed by coming within its radius, from any side."""
+        return self.buoy_en_m is None and not (self.line or self.box or self.search or self.field)
+
 
 def gates_of(voyage: Voyage, approaches: Sequence[Approach] = ()) -> tuple[Gate, ...]:
     """Return the gates of all laps in order. Every buoy is something to keep clear of on every leg.
