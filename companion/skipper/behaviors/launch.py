@@ -13,7 +13,15 @@ from companion.geo.angles import difference_rad
 from companion.messages import MissionState, Mode, Severity
 from companion.skipper.behaviors.helm import arm, make_current, repair, set_mode
 from companion.skipper.behaviors.rest import reached_words
-from companion.skipper.planning.asking import GATHERS_WAY_S, SETS_SAIL_S, UPLOAD_LATENCY_S, drifted_en, lacks, request
+from companion.skipper.planning.asking import (
+    GATHERS_WAY_S,
+    SETS_SAIL_S,
+    UPLOAD_LATENCY_S,
+    drifted_en,
+    lacks,
+    out_of_reach,
+    request,
+)
 from companion.skipper.planning.diversions import announcement, fenced_off, home_trouble
 from companion.skipper.planning.uploads import look_at_margin, upload
 from companion.skipper.planning.vessels import lies_in_the_way
@@ -68,7 +76,9 @@ def start(ctx: StepContext) -> None:
     wants += winds_wanted(ctx)
     wait_s = max(state.plans.retry.not_before_s, state.pending.upload_retry.not_before_s) - ctx.t_s
     if wait_s > 0.0:
-        wrong = _misplaced(ctx) or (lies_in_the_way(ctx) if state.plans.retry.failures else "")
+        wrong = _misplaced(ctx)
+        if not wrong and state.plans.retry.failures:
+            wrong = lies_in_the_way(ctx) or out_of_reach(ctx, ctx.gate)
         wants.append(f"the next try in {wait_s:.0f} s" + (f": {wrong}" if wrong else ""))
     ctx.set(wants=tuple(wants))
     if wants:

@@ -39,7 +39,7 @@ from companion.skipper.behaviors.helm import (
 )
 from companion.skipper.behaviors.position_doubt import stands_off
 from companion.skipper.behaviors.rest import comes_to_rest, rest
-from companion.skipper.planning.asking import request
+from companion.skipper.planning.asking import is_out_of_reach_said, out_of_reach, request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S, is_left_to_beat, tacks_fail
 from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed, is_shut_off
 from companion.skipper.planning.not_found import FOUL, hold
@@ -486,6 +486,8 @@ def _name(ctx: StepContext) -> None:
         wait = state.plans.retry.not_before_s - ctx.t_s
         again = f", trying again in {wait:.0f} s" if wait > 0.0 else ""
         waits = f"waiting for a plan{again}" if state.pending.upload is None else "waiting for a plan's upload"
+        if gate is not None and is_out_of_reach_said(ctx, gate) and (shut := out_of_reach(ctx, gate)):
+            waits += f"; {shut}"
         if not ctx.snapshot.permissions.may_upload:
             waits = "waiting, for uploading is not permitted"
         ctx.phase(Phase.HOLDING, f"loitering in the mission's safe end: {waits}{tail}")

@@ -36,6 +36,8 @@ GATHERS_WAY_S = 1.5  # from AUTO and armed on she drifts on, before her sails dr
 SETS_SAIL_S = SHOWS_S + GATHERS_WAY_S  # ... and meanwhile as long as AUTO and arming take to show
 SLOW_MPS = 0.5  # slower than this the course over ground says nothing about the heading
 KNOWN_SHARE = 0.5  # of the distance to the goal: a way on board that ends so near to it leads there
+OUT_OF_REACH = "goal out of reach"  # the code under which it is said ...
+REACH_S = 1800.0  # ... and so often, while it lasts
 WIDTH_AHEAD_S = 60.0  # how far ahead the interval is taken that a plan remembers of its wind
 
 
@@ -285,6 +287,38 @@ def _aim(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) ->
     # Home is where she was armed, by a quay, and a goal may lie by one: the plan ends as near to it as it may.
     area = ctx.voyage.area if gate >= 0 else ctx.to_stay_in.area
     return aim_near(area, ctx.config, target.en_m, target.radius_m, step.margin_m, gate=gate) or aim
+
+
+def out_of_reach(ctx: StepContext, gate: Gate | None) -> str:
+    """Return that a goal by something solid, to which the ladder has found no way, is not reached, and what helps.
+
+    Empty where it has room by every step of the ladder: then it is something else that shuts it off.
+    """
+    area, wind = ctx.voyage.area, ctx.wind_mean
+    if gate is None or not gate.is_plain or wind is None or diversion(ctx) is not None:
+        return ""
+    most_m = max(step.margin_m for step in steps(ctx))
+    if math.hypot(*gate.en_m) > area.reach_m or float(area.spare_m([gate.en_m], most_m)[0]) >= 0.0:
+        return ""
+    off_m = max(0.0, float(area.clearance_m([gate.en_m])[0]))
+    floor_m = min(ctx.config.margin_floor_m, ctx.config.margin_m)
+    return (
+        f"{gate.name} cannot be reached from here in this wind, {wind[1]:.0f} m/s: it lies {off_m:.1f} m from "
+        f"{area.nearest_name(gate.en_m)}, its radius is {gate.radius_m:g} m, and no way to it keeps the floor of "
+        f"{floor_m:g} m beside her track; it is tried again, and the order skip_goal gives it up"
+    )
+
+
+def is_out_of_reach_said(ctx: StepContext, gate: Gate) -> bool:
+    """Return whether that was said of a goal, and is not to be said again."""
+    return ctx.is_said(f"{OUT_OF_REACH} {gate.goal}", REACH_S)
+
+
+def speak_of_reach(ctx: StepContext, gate: Gate) -> None:
+    """Say of a goal that no step of the ladder has found a way to that it is not reached in this wind: once."""
+    why = "" if is_out_of_reach_said(ctx, gate) else out_of_reach(ctx, gate)
+    if why:
+        ctx.say(Severity.WARNING, f"{OUT_OF_REACH} {gate.goal}", why, every_s=REACH_S)
 
 
 def _nearer(ctx: StepContext, target: Gate, gate: int, start: Start, step: Rung) -> Aim:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from companion.frozen import changed
 from companion.messages import Command, Severity, waypoint
 from companion.planners import AUTO
-from companion.skipper.planning.asking import request
+from companion.skipper.planning.asking import out_of_reach, request, speak_of_reach
 from companion.skipper.planning.diversions import LACK_M, diversion, held_at, is_led_to, room_lacking_m
 from companion.skipper.planning.ladder import first_of_auto
 from companion.skipper.planning.tides import closes_ahead, opens_next
@@ -161,7 +161,7 @@ def not_found(ctx: StepContext, pending: PendingPlan, reason: str) -> None:
         )
         return
     wait = ctx.state.plans.retry.not_before_s - ctx.t_s
-    lies = lies_in_the_way(ctx)
+    lies = lies_in_the_way(ctx) or out_of_reach(ctx, ctx.gate)
     reason += f"; {lies}" if lies else ""
     opens = opens_next(ctx)
     if opens is not None:
@@ -191,6 +191,8 @@ def _is_climbed(ctx: StepContext, pending: PendingPlan, reason: str, *, from_ind
     where, following = ladder[pending.rung].name or "as configured", ladder[pending.rung + 1].name
     text = f"no plan {where} ({reason}): trying {following}"
     ctx.say(Severity.WARNING, f"ladder {pending.rung}", text, every_s=0.0)
+    if ladder[pending.rung + 1].nearer_goal and pending.gate >= 0 and not lies_in_the_way(ctx):
+        speak_of_reach(ctx, ctx.gates[pending.gate])
     return request(ctx, pending.reason, from_index=from_index, rung=pending.rung + 1, text=reason)
 
 

@@ -1,16 +1,21 @@
 """A goal nearer to a quay than a margin keeps clear: aimed at the place inside its radius that keeps it."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from shapely import box
 
+from companion.messages import Severity
 from companion.skipper.planning import asking
 from companion.skipper.planning.ladder import Rung
+from companion.skipper.planning.not_found import not_found
 from companion.skipper.planning.statement import Start
+from companion.skipper.planning.track import steps
+from companion.skipper.step import Announce, ReplanReason
 from companion.skipper.way.gates import gates_of
 from companion.skipper.way.voyage import Goal, Side
-from tests.skipper.moments import moment
+from tests.skipper.moments import asked_for, moment, route
 
 QUAY = box(-300.0, 208.0, 300.0, 230.0)
 MOLE = box(-300.0, 208.0, 300.0, 209.0)
@@ -55,3 +60,18 @@ def test_another_aim_is_not_touched(goal, margin_m):
     _, target, aim = aimed(goal, margin_m)
     assert aim.en_m == target.en_m
     assert aim.gate == 0
+
+
+@pytest.mark.parametrize(("north_m", "is_said"), [(200.0, True), (150.0, False)])
+def test_when_the_ladder_finds_no_way_to_it_that_is_said_once(north_m, is_said):
+    """She waited for ever, "trying again in 290 s", and neither status nor log named skip_goal."""
+    goal = Goal(en_m=(0.0, north_m), radius_m=3.0, name="quay")
+    ctx = moment(goals=(goal,), obstacles=[QUAY], tws_mps=9.0)
+    last = next(n for n, step in enumerate(steps(ctx)) if step.nearer_goal)
+    asked = replace(asked_for(route((0.0, 0.0))), rung=last - 1, reason=ReplanReason.START)
+    for _ in range(2):
+        not_found(ctx, asked, "none")
+    told = [a for a in ctx.actions if isinstance(a, Announce) and "skip_goal" in a.text]
+    assert [a.severity for a in told] == [Severity.WARNING] * is_said
+    assert all("quay cannot be reached from here in this wind, 9 m/s: it lies 8.0 m from" in a.text for a in told)
+    assert bool(asking.out_of_reach(ctx, ctx.gate)) is is_said
