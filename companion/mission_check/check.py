@@ -10,18 +10,19 @@ from pathlib import Path
 import shapely
 
 from companion.boat import loiter_swing_m
-from companion.compose import field_findings_of, tide_of, voyage_of
+from companion.compose import config_of, field_findings_of, tide_of, voyage_of
 from companion.current import hour_words, span_words
 from companion.current.tide import ROWS_REMEDY
 from companion.errors import InputError
 from companion.geofence import Code, Finding, FindingLevel, Mission
+from companion.geofence.area import grown_m
 from companion.geofence.check import AreaConditions, check_area
 from companion.geofence.mission import place_troubles, read_mission
 from companion.messages import GeoPoint
 from companion.mission_check.lines import line_findings, voyage_gates
 from companion.mission_check.sailable import require_sailable
 from companion.skipper import SkipperConfig
-from companion.skipper.planning import LACK_M, TRACKS_M
+from companion.skipper.planning import LACK_M, aim_near, straight_track_m
 from companion.skipper.step import lacking_m
 from companion.skipper.way import KEEP_SHARE, SAME_M, Gate, Side
 
@@ -101,27 +102,43 @@ def check_mission(
 
 
 def _out_of_reach(mission: Mission) -> Iterator[Finding]:
-    """Yield the places to reach that every step of the ladder keeps clear of: its floor, and a straight leg's track."""
-    voyage = voyage_of(mission)
-    least_m = _least_m(mission)
+    """Yield the places to reach inside whose radius none has room: by the ladder's last step, or from a wind on.
+
+    Room is the margin's floor and what a straight leg's track takes; the ladder's last step asks for no more than the
+    margin, but where the margin leaves less hardly a way is found that keeps the floor.
+    """
+    voyage, config = voyage_of(mission), config_of(mission)
+    floor_m = min(mission.margin_floor_m, mission.margin_m)
     for number, goal in enumerate(voyage.goals, start=1):
         if goal.side is not Side.NONE or goal.line or goal.box or goal.search or goal.field:
             continue
+        needs_m = {0: _least_m(mission)}  # in any wind
+        needs_m |= {tws: floor_m + straight_track_m(config, voyage.boat, tws) for tws in WINDS_MPS}
+        found = (
+            (tws, needed_m)
+            for tws, needed_m in needs_m.items()
+            if aim_near(voyage.area, config, goal.en_m, goal.radius_m, needed_m, gate=0) is None
+        )
+        tws, needed_m = next(found, (0, 0.0))
+        if needed_m <= 0.0:
+            continue
         clear_m = float(voyage.area.clearance_m([goal.en_m])[0])
-        if clear_m < least_m:
-            yield Finding(
-                severity=FindingLevel.ERROR,
-                code=Code.GOAL_OUTSIDE,
-                place=f"[[goal]] {number}",
-                text=f"lies {max(0.0, clear_m):.1f} m from {voyage.area.nearest_name(goal.en_m) or 'something'} and is "
-                f"never sailed to: no plan comes nearer than {least_m:g} m, the floor and what her track takes",
-                remedy="move it off, or let [area] margin_m and margin_floor_m be smaller",
-            )
+        never = f"hardly reached in {tws} m/s of wind and more" if tws else "never sailed to"
+        yield Finding(
+            severity=FindingLevel.WARNING if tws else FindingLevel.ERROR,
+            code=Code.GOAL_OUTSIDE,
+            place=f"[[goal]] {number}",
+            text=f"lies {max(0.0, clear_m):.1f} m from {voyage.area.nearest_name(goal.en_m) or 'something'} and is "
+            f"{never}: no place inside its radius of {goal.radius_m:g} m is {grown_m(needed_m):.1f} m clear, the floor "
+            "and what her track takes",
+            remedy="move it off, or let radius_m be larger, or [area] margin_m and margin_floor_m be smaller",
+        )
 
 
 def _least_m(mission: Mission) -> float:
-    """Return how near a goal may lie to be planned to at all [m]: by the ladder's floor, and a straight leg's track."""
-    return min(min(mission.margin_floor_m, mission.margin_m) + TRACKS_M[0], mission.margin_m)
+    """Return the least margin that a plan keeps in any wind [m]: the ladder's floor, and a straight leg's track."""
+    track_m = straight_track_m(config_of(mission), voyage_of(mission).boat, WINDS_MPS[0])
+    return min(min(mission.margin_floor_m, mission.margin_m) + track_m, mission.margin_m)
 
 
 def _roundings(mission: Mission) -> Iterator[Finding]:

@@ -202,14 +202,28 @@ def test_the_sweeps_of_a_search_are_told_and_drawn(tmp_path, capsys):
     assert "Area: 10 sweeps, 1" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("floor_m", "is_reached"), [(4.0, False), (2.0, True)])
-def test_a_goal_that_every_step_of_the_ladder_keeps_clear_of_is_said_before_sailing(tmp_path, floor_m, is_reached):
-    """It was "in order" 5 m from its fence with a floor of 4 m, and she waited before it for forty minutes."""
+@pytest.mark.parametrize(
+    ("floor_m", "radius_m", "says"),
+    [
+        (4.0, 1.0, "never sailed to"),
+        (4.0, 3.0, "hardly reached in 7 m/s of wind and more"),
+        (4.0, 9.0, ""),
+        (2.0, 1.0, "hardly reached in 7 m/s of wind and more"),
+        (2.0, 9.0, ""),
+    ],
+)
+def test_a_goal_that_every_step_of_the_ladder_keeps_clear_of_is_said_before_sailing(tmp_path, floor_m, radius_m, says):
+    """It was "in order" 5 m from its fence with a floor of 4 m, and she waited before it for forty minutes.
+
+    Inside its radius there may be room, and a fast boat's track takes more of it.
+    """
     ring = "-0.01 -0.01, 0.01 -0.01, 0.01 0.01, -0.01 0.01, -0.01 -0.01"
     (tmp_path / "fence.wkt").write_text(f"w|inclusion|POLYGON (({ring}))")
     (tmp_path / "m.toml").write_text(
-        "[start]\nlat = 0.0\nlon = 0.0\n[[goal]]\nlat = 0.00995478\nlon = 0.0\n"
+        "[start]\nlat = 0.0\nlon = 0.0\n"
+        f"[[goal]]\nlat = 0.00995478\nlon = 0.0\nradius_m = {radius_m}\n"
         f'[area]\nfence = "fence.wkt"\nmargin_m = 8.0\nmargin_floor_m = {floor_m}\n'
     )
-    told = [f.text for f in check_mission(tmp_path / "m.toml").findings if "never sailed to" in f.text]
-    assert bool(told) is not is_reached
+    told = [f.text for f in check_mission(tmp_path / "m.toml").findings if "inside its radius" in f.text]
+    assert len(told) == bool(says)
+    assert all(says in text for text in told)

@@ -2,8 +2,8 @@
 
 from companion.skipper.planning.diversions import LACK_M
 from companion.skipper.planning.next_tack import FOLLOWS, next_tack, next_tack_s, on_leg
-from companion.skipper.planning.statement import planned_forecast
-from companion.skipper.planning.track import TRACKS_M
+from companion.skipper.planning.statement import aim_near, planned_forecast
+from companion.skipper.planning.track import straight_track_m
 from companion.skipper.planning.vessels import (
     ALIKE_S,
     GIVE_UP_RISK,
@@ -25,10 +25,11 @@ __all__ = [
     "OWN_TIMING_MPS",
     "PART_BY_RUNG",
     "SETTLED_M",
-    "TRACKS_M",
+    "aim_near",
     "next_tack",
     "next_tack_s",
     "on_leg",
     "planned_forecast",
     "soon",
+    "straight_track_m",
 ]

@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from companion.boat import AutopilotLimits
+from companion.boat import AutopilotLimits, Boat
 from companion.boat.tracking import GuidanceModel, stated_error_m
 from companion.messages import WindForecast
 from companion.planner import Problem
 from companion.planner.track import ExpectedTrack, expected
 from companion.skipper.planning.ladder import Rung, rungs
 from companion.skipper.planning.statement import Start
+from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.context import StepContext
 from companion.skipper.way.voyage import AreaLike, PointEn, water_to_keep
 
@@ -52,12 +53,20 @@ def steps(ctx: StepContext) -> tuple[Rung, ...]:
     wind, in_current = ctx.wind_mean, ctx.snapshot.current.is_significant
     if wind is None:
         return rungs(ctx.config, in_current=in_current)
-    best = ctx.voyage.boat.polar.max_speed_mps(wind[1])
-    error_m = stated_error_m(best, _helm(ctx), has_short=not _is_known(ctx))
-    track_m = error_m + ctx.voyage.boat.hull.reach_m
-    return rungs(
-        ctx.config, track_m=next((step for step in TRACKS_M if step >= track_m), track_m), in_current=in_current
-    )
+    track_m = _straight_m(ctx.voyage.boat, wind[1], _helm(ctx), is_known=_is_known(ctx))
+    return rungs(ctx.config, track_m=track_m, in_current=in_current)
+
+
+def straight_track_m(config: SkipperConfig, boat: Boat, tws_mps: float) -> float:
+    """Return what a straight leg's track takes beside it in a wind [m], by an autopilot with its defaults."""
+    helm = GuidanceModel.of(AutopilotLimits(sail_xtrack_max_m=config.tack_corridor_m))
+    return _straight_m(boat, tws_mps, helm, is_known=True)
+
+
+def _straight_m(boat: Boat, tws_mps: float, helm: GuidanceModel, *, is_known: bool) -> float:
+    """Return what a straight leg's track takes beside it in a wind [m], in steps, the hull with it."""
+    track_m = stated_error_m(boat.polar.max_speed_mps(tws_mps), helm, has_short=not is_known) + boat.hull.reach_m
+    return next((step for step in TRACKS_M if step >= track_m), track_m)
 
 
 def _helm(ctx: StepContext) -> GuidanceModel:
