@@ -217,8 +217,7 @@ def _circles(mission: Mission) -> Iterator[Finding]:
 def _doubts(mission: Mission) -> Iterator[Finding]:
     """Yield what is hardly meant: goals too small to meet, one name for two places, a key that does nothing."""
     for number, goal in enumerate(mission.goals, start=1):
-        is_place = goal.rounding is None and goal.gate is None and goal.box is None and goal.search is None
-        if is_place and goal.field is None and goal.radius_m < SMALL_M:
+        if goal.is_plain and goal.radius_m < SMALL_M:
             yield Finding(
                 severity=FindingLevel.WARNING,
                 code=Code.SMALL,

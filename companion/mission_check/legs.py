@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from statistics import NormalDist
 
-from companion.compose import boat_of, drying_of, tide_of, water_of
+from companion.compose import boat_of, config_of, drying_of, tide_of, water_of
 from companion.current import STILL_WATER, WaterCurrent, over_water
 from companion.errors import InputError
 from companion.geo.frame import LocalFrame
@@ -16,7 +16,7 @@ from companion.geofence import LocalArea, Mission
 from companion.mission_check.lines import NO_ROOM_REMEDY, crowded_lines
 from companion.planner import Plan, Problem
 from companion.planner.problem import assumed
-from companion.skipper.planning import HOME_RADIUS_M
+from companion.skipper.planning import HOME_RADIUS_M, aim_near
 from companion.skipper.way import timed
 
 PROBE_M = 100.0
@@ -142,7 +142,8 @@ def legs(
 
     ``goes_home``: the leg home belongs to it, where the mission ends there. Home is taken to be the
     start: the autopilot's is where it was armed. Without a start there is no leg. ``unix_s``: when the voyage begins,
-    for the row of a tide table that each leg begins in; without it tables are left out.
+    for the row of a tide table that each leg begins in; without it tables are left out. A goal by something solid is
+    aimed at as the skipper does, where its radius has room.
 
     Raises:
         ValueError: no water is left inside the fence at the margin.
@@ -162,12 +163,15 @@ def legs(
         if number in closed:
             raise InputError(str(mission.path), f"[[goal]] {number}", closed[number], NO_ROOM_REMEDY)
         blows = replace(wind, from_deg=wind.from_deg + _north_deg(frame, here)) if mission.is_passage else wind
+        goal_en, within_m = frame.en_from_geo(point), radius_m
+        if number <= len(mission.goals) and mission.goals[number - 1].is_plain:
+            goal_en, within_m = _aim(mission, goal_en, radius_m, local)
         answer = yield leg_problem(
             mission,
             here,
             heading_deg,
-            frame.en_from_geo(point),
-            radius_m,
+            goal_en,
+            within_m,
             wind=blows,
             title=title,
             local=local,
@@ -179,6 +183,14 @@ def legs(
         unix_s = None if unix_s is None else unix_s + answer.cost_s
         here = (float(answer.waypoints_en[-1][0]), float(answer.waypoints_en[-1][1]))
         heading_deg = math.degrees(answer.legs[-1].heading_rad) if answer.legs else heading_deg
+
+
+def _aim(
+    mission: Mission, goal_en: tuple[float, float], radius_m: float, local: LocalArea
+) -> tuple[tuple[float, float], float]:
+    """Return where a leg to a plain goal ends and within what [m]: there, or where its radius has room beside it."""
+    aim = aim_near(local, config_of(mission), goal_en, radius_m, mission.margin_m, gate=0)
+    return (goal_en, radius_m) if aim is None or aim.en_m == goal_en else (aim.en_m, aim.radius_m)
 
 
 def _north_deg(frame: LocalFrame, here_en: tuple[float, float]) -> float:

@@ -13,6 +13,7 @@ from companion.current import CurrentEstimator, over_water
 from companion.geofence import load_mission
 from companion.mission_check import AssumedWind, expected_current, layline_rad, legs, planned_legs
 from companion.planner import Plan, plan
+from companion.planner.problem.evaluate import endpoint_error
 from companion.plots.mission import _words
 
 SOUTH = Path("sitl/missions/southern-tide.toml")
@@ -97,6 +98,23 @@ def test_each_leg_has_the_row_of_a_tide_table_that_it_begins_in(mission_with):
     assert first_problem(mission, HIGH_S + 3600.0).current.set_rad == pytest.approx(1.5 * math.pi)
     assert first_problem(mission).current.drift_mps == 0.0, "no row without a time"
     assert first_problem(mission, HIGH_S + 1e6).current.drift_mps == 0.0, "it has ended: not believed any more"
+
+
+@pytest.mark.parametrize(("radius_m", "clear_m"), [(15.0, 12.0), (4.0, 8.0)])
+def test_a_preview_aims_at_the_room_inside_the_radius_of_a_goal_by_a_quay_as_she_does(tmp_path, radius_m, clear_m):
+    """8 m from it "no path (invalid)" was said of what she sails to; without room inside it still is."""
+    ring = "-0.01 -0.01, 0.01 -0.01, 0.01 0.01, -0.01 0.01, -0.01 -0.01"
+    (tmp_path / "fence.wkt").write_text(f"w|inclusion|POLYGON (({ring}))")
+    (tmp_path / "m.toml").write_text(
+        "[start]\nlat = 0.0\nlon = 0.0\n"
+        f"[[goal]]\nlat = 0.00992765\nlon = 0.0\nradius_m = {radius_m}\n"
+        '[area]\nfence = "fence.wkt"\nmargin_m = 12.0\nmargin_floor_m = 6.0\n'
+    )
+    mission = load_mission(tmp_path / "m.toml")
+    problem = first_problem(mission)
+    (aimed_m,) = mission.water().clearance_m([problem.goal_en])
+    assert 0.0 <= aimed_m - clear_m < 1.0
+    assert (endpoint_error(problem) is None) is (radius_m > 10.0)
 
 
 def test_the_way_of_a_preview_is_another_in_a_stream_and_keeps_the_margin():

@@ -99,6 +99,11 @@ class MissionGoal:
     search: GoalSearch | None = None
     field: GoalField | None = None
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a place that is reached inside its radius, from any side."""
+        return self.rounding is None and not (self.gate or self.box or self.search or self.field)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RefugePoint:
