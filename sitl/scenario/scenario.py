@@ -345,7 +345,7 @@ class EventSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     sog_mps: float = 0.0
     every_s: float = 10.0  # between its AIS reports
     is_on_ais: bool = True
-    length_m: float | None = None  # of a vessel; none: a ship of 100 m, a boat of 3.65 m
+    length_m: float | None = None  # of a vessel; none: a ship of 100 m, a boat of 3.65 m; the autopilot's AIS lacks it
     gap_m: float = 0.0
     bearing_deg: float = 0.0  # clockwise
     craft: Craft = "power"
