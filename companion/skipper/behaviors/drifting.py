@@ -35,6 +35,7 @@ ASTERN_MPS = 0.3  # slower going astern shows nothing: a turn, a wave, a noisy r
 ASTERN_RAD = math.radians(30.0)  # the course is so near to dead astern of the bow
 AWAY_M = 25.0  # LOITER has been measured to stay within 12 m of its point
 TAU_S = 10.0  # of the mean velocity: longer than a wave, shorter than a board
+BOW_TAU_S = 3.0  # of the mean as seen from the bow: a boat that has stopped shows it at once, a tack is no stop
 SPARE = 1.3  # what can stem a drift is this much faster
 FAILED_S = 60.0  # a means that has not stopped the drift within this will not
 CALL = "anchor"  # the code under which the crew is called
@@ -48,18 +49,32 @@ def follow_ground(ctx: StepContext) -> None:
     """Keep the mean velocity over ground, and the places of the last minute of a boat that hardly moves."""
     vehicle, boat, memory = ctx.snapshot.vehicle, ctx.reckoned_en, ctx.state.adrift
     if vehicle is None or boat is None:
-        ctx.set(adrift=replace(memory, ground_en_mps=None, places=()))
+        ctx.set(adrift=replace(memory, ground_en_mps=None, bow_mps=None, places=()))
         return
-    before = memory.ground_en_mps
-    share = 1.0 if before is None else -math.expm1(-max(0.0, ctx.t_s - memory.ground_t_s) / TAU_S)
-    east, north = before or (0.0, 0.0)
-    after = (east + share * (vehicle.velocity_en_mps[0] - east), north + share * (vehicle.velocity_en_mps[1] - north))
+    since_s = ctx.t_s - memory.ground_t_s
+    after = _mean(memory.ground_en_mps, vehicle.velocity_en_mps, since_s, TAU_S)
+    bow = _mean(memory.bow_mps, _from_the_bow(vehicle.velocity_en_mps, vehicle.heading_rad), since_s, BOW_TAU_S)
     places = memory.places
     if math.hypot(*after) >= DRIFT_MPS:
         places = ()
     elif not places or ctx.t_s - places[-1].t_s >= PLACE_S:
         places = (*places[-SLOW_PLACES:], Fix(t_s=ctx.t_s, en_m=boat))
-    ctx.set(adrift=replace(memory, ground_en_mps=after, ground_t_s=ctx.t_s, places=places))
+    ctx.set(adrift=replace(memory, ground_en_mps=after, bow_mps=bow, ground_t_s=ctx.t_s, places=places))
+
+
+def _mean(
+    before: tuple[float, float] | None, now: tuple[float, float], since_s: float, tau_s: float
+) -> tuple[float, float]:
+    if before is None:
+        return now
+    share = -math.expm1(-max(0.0, since_s) / tau_s)
+    return before[0] + share * (now[0] - before[0]), before[1] + share * (now[1] - before[1])
+
+
+def _from_the_bow(velocity_en_mps: tuple[float, float], heading_rad: float) -> tuple[float, float]:
+    """Return a velocity over ground to starboard and ahead [m/s]."""
+    (east, north), sin, cos = velocity_en_mps, math.sin(heading_rad), math.cos(heading_rad)
+    return east * cos - north * sin, east * sin + north * cos
 
 
 def over_ground(ctx: StepContext) -> tuple[float, float] | None:
@@ -86,8 +101,14 @@ def sails(ctx: StepContext) -> bool:
 
 
 def _is_against(ctx: StepContext, ground: tuple[float, float]) -> bool:
-    vehicle = ctx.snapshot.vehicle
-    return vehicle is not None and abs(difference_rad(heading_of(*ground), vehicle.heading_rad)) > AGAINST_RAD
+    """Return whether the boat goes elsewhere than its bow points.
+
+    A boat that tacks does not: the mean over ground is still of the board before, as seen from the bow it makes way.
+    """
+    vehicle, bow = ctx.snapshot.vehicle, ctx.state.adrift.bow_mps
+    if vehicle is None or abs(difference_rad(heading_of(*ground), vehicle.heading_rad)) <= AGAINST_RAD:
+        return False
+    return bow is None or bow[1] < SAILS_MPS or abs(heading_of(*bow)) > AGAINST_RAD
 
 
 def goes_astern(ctx: StepContext) -> bool:

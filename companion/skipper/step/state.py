@@ -188,6 +188,7 @@ class Adrift:
     """How the boat moves over ground, and what was done to stop a drift (``companion.skipper.behaviors.drifting``)."""
 
     ground_en_mps: tuple[float, float] | None = None  # mean velocity of the last seconds
+    bow_mps: tuple[float, float] | None = None  # the same to starboard and ahead, as seen from the bow at each time
     ground_t_s: float = float("-inf")
     places: tuple[Fix, ...] = ()  # of the last minute, of a boat that hardly moves
     since_s: float | None = None  # since when a drift onto something is being stopped

@@ -1,7 +1,7 @@
 """A boat that does not sail: drifting is seen, held against the area, said and stopped; then she sails on."""
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import pytest
@@ -10,7 +10,16 @@ import shapely.affinity
 from shapely import box
 
 from companion.messages import Mode
-from companion.skipper.behaviors.drifting import CALL, MEANS, is_cramped, lies_in_loiter, stops_drift
+from companion.skipper.behaviors.drifting import (
+    CALL,
+    MEANS,
+    drift,
+    follow_ground,
+    is_cramped,
+    lies_in_loiter,
+    sails,
+    stops_drift,
+)
 from companion.skipper.step import actions as act
 from companion.skipper.step.context import StepContext
 from companion.skipper.step.saved import Persisted
@@ -250,3 +259,43 @@ def test_no_loiter_is_begun_beside_a_rock_that_she_would_sail_onto(tws_mps, rock
     w.wind = lambda t: (-1.5, tws_mps)
     w.run(15)
     assert is_cramped(StepContext(voyage, w.skipper.config, w.state, w.snapshot())) is cramped
+
+
+def sailed(*track, heading_deg):
+    """Return the moment after a track of (heading [deg], velocity east, velocity north [m/s]), one a second."""
+    parts = {}
+    for n, (heading, east, north) in enumerate(track):
+        ctx = moment(heading_deg=heading, adrift=parts)
+        vehicle = replace(ctx.snapshot.vehicle, velocity_en_mps=(east, north))
+        ctx.snapshot = replace(ctx.snapshot, t_s=NOW_S + n, vehicle=vehicle)
+        follow_ground(ctx)
+        parts = {f.name: getattr(ctx.state.adrift, f.name) for f in fields(ctx.state.adrift)}
+    assert heading == heading_deg
+    return ctx
+
+
+BOARD = ((-45.0, -1.8, 1.8),) * 30  # of a boat that beats: 2.5 m/s to the north-west
+
+
+def test_a_boat_that_tacks_is_not_drifting():
+    """The mean over ground was still of the board before: "anchor! drifting 2 m/s" was called in a planned tack."""
+    turn = [(heading, math.sin(math.radians(heading)), math.cos(math.radians(heading))) for heading in (-20, 10, 45)]
+    way = [*BOARD, *turn, *((45.0, 1.4, 1.4),) * 10]
+    for n in range(len(BOARD), len(way)):
+        ctx = sailed(*way[: n + 1], heading_deg=way[n][0])
+        assert drift(ctx) is None, n
+        assert sails(ctx), n
+
+
+@pytest.mark.parametrize(
+    ("now", "within_s"),
+    [
+        ((-45.0, 0.4, -0.4), 24),  # astern, on the heading that she had: by the mean over ground alone
+        ((45.0, -0.4, -0.4), 5),  # astern behind a turn
+        ((45.0, -0.6, 0.6), 5),  # sideways behind a turn
+    ],
+)
+def test_a_boat_that_is_carried_is_drifting_soon(now, within_s):
+    ctx = sailed(*BOARD, *(now,) * within_s, heading_deg=now[0])
+    assert drift(ctx) is not None
+    assert not sails(ctx)
