@@ -45,7 +45,7 @@ class Response(enum.Enum):
     BY_FIELD = "steer by field under GUIDED, plan again from there, back to AUTO when the way is clear"
     AS_SET = "what the mission's `[safety]` says of it"
     TURN_BACK = "back over water that she has sounded to a loiter in it; then a plan, with the shoal in the area"
-    BACK = "say so; where the straight way back is not clear, plan one"
+    BACK = "say so; where the straight way back is not clear, plan one; if the voyage is not over, LOITER first"
 
 
 class End(enum.StrEnum):
@@ -236,7 +236,7 @@ TABLE: tuple[Watchdog, ...] = (
                   until="until a ground station is heard", settings=(
                       Setting(key="shore_lost_s", default=600.0, least=10.0, says="no station for this long"),))),
     W(name="dragged off", number=23,
-      watches="distance from the place of the loiter when the voyage is over", enter=40.0,
+      watches="distance from the place of the loiter in which she is to stay", enter=40.0,
       exit=25.0, unit="m", enter_s=10.0, exit_s=10.0, severity=S.ERROR, response=Response.BACK, loitering=True,
       why="a loiter keeps within 13 m of it; farther off the wind is gone, a current is stronger, or she is towed"),
     W(name="planner dead", number=24,

@@ -9,6 +9,7 @@ import shapely
 
 from companion.frozen import changed
 from companion.messages import Severity
+from companion.orders import Verb
 from companion.skipper.behaviors.field_guidance import has_sailed
 from companion.skipper.planning.diversions import LACK_M
 from companion.skipper.planning.tides import dries_under
@@ -39,6 +40,10 @@ def pass_gates(ctx: StepContext) -> None:
     if boat is None:
         return
     by_field = ctx.is_field_steered
+    standing = ctx.state.orders.standing
+    if standing is not None and standing.verb is Verb.HOLD:  # what she comes by meanwhile is not sailed to
+        follow_search(ctx)
+        return
     _approach(ctx)
     _cross(ctx)
     if ctx.gate is not None and ctx.gate.line is not None and not waits_for_gun(ctx, ctx.gate):

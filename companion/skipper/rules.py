@@ -24,7 +24,7 @@ from companion.skipper.behaviors.shoaling import follow_soundings
 from companion.skipper.board.resumed import leg_under_way, resumed, saved_goals
 from companion.skipper.board.vehicle_identity import judge
 from companion.skipper.intake import count_time, locate, remember_fix, take_events, take_outcomes
-from companion.skipper.planning.diversions import speak_of_fence
+from companion.skipper.planning.diversions import follow_place, speak_of_fence
 from companion.skipper.planning.ladder import rungs
 from companion.skipper.planning.track import TRACKS_M
 from companion.skipper.priorities import act
@@ -182,6 +182,7 @@ def observe(ctx: StepContext) -> None:
     watch_water(ctx)
     watch_tacks(ctx)
     learn_boat(ctx)
+    follow_place(ctx)
     watch(ctx)
     follow_fallback(ctx)
     follow_soundings(ctx)

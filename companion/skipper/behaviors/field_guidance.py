@@ -25,7 +25,7 @@ from companion.geo.angles import wrap_pi
 from companion.messages import Mode, Severity
 from companion.skipper.behaviors.helm import is_busy, set_mode
 from companion.skipper.planning.asking import request
-from companion.skipper.planning.diversions import diversion, is_composed
+from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed
 from companion.skipper.planning.not_found import hold
 from companion.skipper.planning.right_of_way import held_of
 from companion.skipper.planning.vessels import GIVE_UP_RISK, near, timed_legs
@@ -275,7 +275,8 @@ def last_resort(ctx: StepContext) -> bool:
     resort = memory.resort.step(ctx.t_s, too_near=raised, can_plan=_is_planned(ctx), clear_s=0.0)
     if memory.resort.engaged and not resort.engaged:
         bound = diversion(ctx)
-        ctx.set(by_field=FieldSteering(let_go_s=ctx.t_s) if _is_at_rest(ctx) else FieldSteering())
+        lies = _is_at_rest(ctx) or is_at_rest(ctx)
+        ctx.set(by_field=FieldSteering(let_go_s=ctx.t_s) if lies else FieldSteering())
         back = "her place" if bound is None and _lies(ctx) else "the plan"
         if bound is not None and not bound.has_place:
             hold(ctx, bound.sentence, anew=True)

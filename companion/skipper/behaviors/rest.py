@@ -10,27 +10,34 @@ from __future__ import annotations
 import math
 
 from companion.frozen import changed
+from companion.geo.angles import difference_rad
 from companion.messages import Mode, Severity
 from companion.safety import BY_NAME, BY_RANK, ENDINGS, OUT_OF_TIME, SHORE, STOPPING, End
+from companion.skipper.behaviors.drifting import is_cramped
 from companion.skipper.behaviors.failsafe import waits_for
 from companion.skipper.behaviors.field_guidance import keeps_station
-from companion.skipper.behaviors.helm import hand_back, repair
+from companion.skipper.behaviors.helm import hand_back, is_busy, repair, set_mode
 from companion.skipper.planning.diversions import (
+    DRAGGED,
     HOME,
     OFF_HOME,
     ROOM,
     home_trouble,
     is_at_rest,
     is_shut_off,
+    off_place_m,
+    place_to_keep,
     pressing,
     station_left_s,
 )
 from companion.skipper.step import Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
-from companion.skipper.way import distance_m
+from companion.skipper.way import bearing_rad, distance_m
 from companion.words import goals_reached
 
 ANSWERED = {"": "for a person", SHORE: "until the link to the shore is back, or a person gives AUTO"}
 TAKEN = "until a person takes her and gives AUTO back"
+BACK_RAD = math.radians(60.0)  # off her place: what is farther astern she is turned to first
+TURNS_S = 30.0
 NEAR_M = 35.0  # a loiter so far off a place is at it
 LIES = {  # behind the last goal
     HOME: "; home",
@@ -46,7 +53,11 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     if is_station and station_left_s(ctx) > 0.0 and keeps_station(ctx, bound.en_m):
         _begin_station(ctx, bound)
         return True
-    if not is_at_rest(ctx) or is_shut_off(ctx) or ctx.state.steering.own_mode in STOPPING:
+    if not is_at_rest(ctx) or is_shut_off(ctx):
+        return False
+    if bound.kind is not DiversionKind.REST and _comes_about(ctx):
+        return True
+    if ctx.state.steering.own_mode in STOPPING:
         return False
     if (
         ctx.is_raised(OUT_OF_TIME)
@@ -70,9 +81,43 @@ def comes_to_rest(ctx: StepContext, bound: Diversion) -> bool:
     if is_station:
         _begin_station(ctx, bound)
         return True
-    where = "staying near by" if bound.kind is DiversionKind.STAY else _at(ctx, bound)
+    off_m = off_place_m(ctx) or 0.0
+    if ctx.is_raised(DRAGGED) or off_m >= BY_NAME[DRAGGED].enter:
+        where = f"{off_m:.0f} m off the place where she is to stay"
+    else:
+        where = "staying near by" if bound.kind is DiversionKind.STAY else _at(ctx, bound)
     how_long = UNTIL_TOLD if bound.is_ordered else bound.until or _how_long(ctx)
     ctx.phase(Phase.HOLDING, f"{where}: {bound.why}; waiting {how_long}")
+    return True
+
+
+def _comes_about(ctx: StepContext) -> bool:
+    """Ask for LOITER once, of a boat that leaves where she is to stay: it turns her, and AUTO leads her back."""
+    text = "she leaves the place where she is to stay: LOITER, then back to it"
+    is_asked = ctx.is_raised(DRAGGED) and is_busy(ctx, Mode.LOITER.name)
+    if not is_asked:
+        is_stopped = ctx.state.steering.own_mode in STOPPING
+        if DRAGGED not in ctx.fresh or is_stopped or is_cramped(ctx) or not set_mode(ctx, Mode.LOITER, text):
+            return False
+    ctx.phase(Phase.HOLDING, f"{text}; waiting for the autopilot to take it")
+    return True
+
+
+def turns_back_to_place(ctx: StepContext) -> bool:
+    """Keep the LOITER of a boat that has left the place where she is to stay, until her bow points back; True then.
+
+    AUTO does not turn a boat whose point is dead astern in every autopilot. What does not turn here turns nowhere.
+    """
+    since_s = next((r.since_s for r in ctx.state.alarms.raised if r.name == DRAGGED), None)
+    place, boat, vehicle, status = place_to_keep(ctx), ctx.boat_en, ctx.snapshot.vehicle, ctx.autopilot
+    if since_s is None or ctx.t_s - since_s > TURNS_S or ctx.state.voyage.over or ctx.snapshot.unsure:
+        return False
+    if place is None or boat is None or vehicle is None or status is None or status.mode is not Mode.LOITER:
+        return False
+    if abs(difference_rad(bearing_rad(boat, place), vehicle.heading_rad)) < BACK_RAD:
+        return False
+    off_m = distance_m(boat, place)
+    ctx.phase(Phase.HOLDING, f"{off_m:.0f} m off the place where she is to stay: waiting in LOITER for her to turn")
     return True
 
 

@@ -38,7 +38,7 @@ from companion.skipper.behaviors.helm import (
     tack,
 )
 from companion.skipper.behaviors.position_doubt import stands_off
-from companion.skipper.behaviors.rest import comes_to_rest, rest
+from companion.skipper.behaviors.rest import comes_to_rest, rest, turns_back_to_place
 from companion.skipper.planning.asking import is_out_of_reach_said, out_of_reach, request
 from companion.skipper.planning.autopilot_beats import IRONS_MEMORY_S, is_left_to_beat, tacks_fail
 from companion.skipper.planning.diversions import diversion, is_at_rest, is_composed, is_shut_off
@@ -258,7 +258,8 @@ def sail_on(ctx: StepContext) -> bool:
     stopped = ctx.state.steering.own_mode in STOPPING
     if not stopped or ctx.autopilot is None or ctx.autopilot.mode is not ctx.state.steering.own_mode:
         return False
-    _plan_and_resume(ctx)
+    if not turns_back_to_place(ctx):
+        _plan_and_resume(ctx)
     return True
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from companion.boat import Boat
 from companion.messages import Severity
 from companion.orders import Verb
-from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, End, Recovery
+from companion.safety import BATTERY, BY_RANK, ENDINGS, FAILSAFES, SHORE, STOPPING, End, Recovery
 from companion.skipper.planning.statement import aim_near
 from companion.skipper.planning.track import steps
 from companion.skipper.planning.waits import gun_in_s, stay_left_s, waiting_en, waits_for_gun
@@ -557,6 +557,41 @@ def is_at_rest(ctx: StepContext) -> bool:
     if bound is None or route is None or ctx.ahead():
         return False
     return bound.kind is DiversionKind.STAY or is_led_to(ctx, bound)
+
+
+def place_to_keep(ctx: StepContext) -> PointEn | None:
+    """Return the place of the loiter that the boat is told to stay in, None: there is none, or she lies elsewhere."""
+    state, route, bound = ctx.state, ctx.state.mission.route, diversion(ctx)
+    if state.voyage.over and (bound is None or bound.kind is DiversionKind.REST):
+        return state.voyage.rest_en_m
+    if route is None or not route.points_en_m or not is_at_rest(ctx) or state.pending.upload is not None:
+        return None
+    is_stopped = state.steering.own_mode in STOPPING and not ctx.is_raised(DRAGGED)  # its LOITER is elsewhere
+    return None if is_stopped or ctx.is_field_steered else route.points_en_m[-1]
+
+
+def follow_place(ctx: StepContext) -> None:
+    """Keep how near she has been to the loiter that ends the mission on board, since nothing else of it is left."""
+    memory, route, boat, since_s = ctx.state.adrift, ctx.state.mission.route, ctx.boat_en, ctx.state.mission.uploaded_s
+    if route is None or not route.points_en_m or boat is None:
+        return
+    before_m = memory.nearest_m if memory.nearest_s == since_s else math.inf
+    nearest_m = math.inf if ctx.ahead() else min(before_m, distance_m(boat, route.points_en_m[-1]))
+    if (nearest_m, since_s) != (memory.nearest_m, memory.nearest_s):
+        ctx.set(adrift=replace(memory, nearest_m=nearest_m, nearest_s=since_s))
+
+
+def off_place_m(ctx: StepContext) -> float | None:
+    """Return how far the boat is off the place where she is to stay [m], 0: she is at it or comes to it.
+
+    None where there is no such place, or a field keeps her off it.
+    """
+    place, boat = place_to_keep(ctx), ctx.boat_en
+    if place is None or boat is None or is_led_off(ctx):
+        return None
+    off_m, swing_m, nearest_m = distance_m(boat, place), SWINGS * ctx.loiter_swing_m, ctx.state.adrift.nearest_m
+    comes = not ctx.state.voyage.over and swing_m < nearest_m and off_m < nearest_m + swing_m
+    return 0.0 if off_m <= swing_m or comes else off_m
 
 
 POLICY_WORDS = {

@@ -197,6 +197,8 @@ class Adrift:
     loiter_s: float = float("inf")  # ... and when, of a wind that is doubted
     motor: bool = False  # the autopilot has accepted to run it
     looked_s: float = float("-inf")  # when sea room was looked for last
+    nearest_m: float = float("inf")  # to the loiter that ends the mission on board she has been ...
+    nearest_s: float = float("-inf")  # ... which came on board then
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

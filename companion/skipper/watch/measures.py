@@ -14,9 +14,9 @@ from companion.skipper.behaviors.drifting import meets_in_s, sails
 from companion.skipper.behaviors.field_guidance import meets_in
 from companion.skipper.behaviors.shoaling import depth_ahead_m
 from companion.skipper.planning.autopilot_beats import beaten_within_m
-from companion.skipper.planning.diversions import SWINGS, diversion, home_trouble, is_composed, is_led_off
+from companion.skipper.planning.diversions import diversion, home_trouble, is_composed, off_place_m
 from companion.skipper.planning.fallback import to_go
-from companion.skipper.step import DiversionKind, StepContext, WindHealth
+from companion.skipper.step import StepContext, WindHealth
 from companion.skipper.step.state import Charge
 from companion.skipper.step.wind_limits import too_light, too_strong
 from companion.skipper.way.geometry import along_m, bearing_rad, cross_track_m, distance_m, moved
@@ -257,16 +257,6 @@ def _time(ctx: StepContext) -> float | None:
     return None if limit_s is None else ctx.state.voyage.under_way_s / limit_s
 
 
-def _dragged(ctx: StepContext) -> float | None:
-    rest, boat = ctx.state.voyage.rest_en_m, ctx.boat_en
-    if rest is None or boat is None or is_led_off(ctx):
-        return None
-    bound, off_m = diversion(ctx), distance_m(boat, rest)
-    if bound is not None and bound.kind is not DiversionKind.REST:
-        return None
-    return off_m if off_m > SWINGS * ctx.loiter_swing_m else 0.0
-
-
 def _planner(ctx: StepContext) -> float | None:
     return float(not ctx.snapshot.planner_alive)
 
@@ -309,7 +299,7 @@ _MEASURES: dict[str, Callable[[StepContext], float | None]] = {
     "battery low": _battery_low,
     "battery critical": _battery_critical,
     "out of time": _time,
-    "dragged off": _dragged,
+    "dragged off": off_place_m,
     "planner dead": _planner,
     "dark": _dark,
     "shore lost": _shore,

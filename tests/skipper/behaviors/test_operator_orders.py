@@ -15,7 +15,7 @@ from companion.skipper.step import actions as act
 from companion.skipper.step.config import ALL_PERMITTED, DRY_RUN, Guidance
 from companion.skipper.step.saved import Persisted
 from companion.skipper.step.state import Phase
-from companion.skipper.way.geometry import distance_m
+from companion.skipper.way.geometry import bearing_rad, distance_m
 from companion.skipper.way.voyage import Goal
 from tests.skipper.test_voyage import is_done, is_sailing, make
 from tests.skipper.world import FRAME, order, restarted
@@ -76,6 +76,28 @@ def test_hold_is_here_and_lasts_until_told_to_go_on(guidance):
     assert answer(world, "go_on").text == "the end of hold: on to A"
     assert world.run(1500, is_done)
     assert world.state.progress.reached == (0, 1)
+
+
+def test_told_to_hold_a_boat_that_sails_off_is_alarmed_turned_once_and_counts_no_goal(monkeypatch):
+    """A loiter dead astern: she sailed 490 m, through the fence, "staying near by", and "up reached" was said."""
+    goal = Goal(en_m=(350.0, 0.0), name="A")
+    world = sailing(goal)
+    answer(world, "hold")
+    world.run(40)
+    assert world.state.why.startswith("staying near by")
+    with monkeypatch.context() as stuck:
+        stuck.setattr(world, "_auto", lambda _: bearing_rad(world.position, goal.en_m))
+        assert world.run(120, lambda w: w.state.alarms.raised)
+        assert [raised.name for raised in world.state.alarms.raised] == ["dragged off"]
+        assert world.run(5, lambda w: w.mode is Mode.LOITER)
+        assert "staying near by" not in world.state.why
+        assert world.run(60, lambda w: w.mode is Mode.AUTO), "what does not turn in LOITER turns nowhere"
+        assert world.run(120, lambda w: distance_m(w.position, goal.en_m) < 3.0)
+        assert "m off the place where she is to stay: ordered by" in world.state.why
+        assert [a.mode for _, a in world.actions if isinstance(a, act.SetMode)][-2:] == [Mode.LOITER, Mode.AUTO]
+    assert world.run(200, lambda w: not w.state.alarms.raised)
+    assert "staying near by" in world.state.why
+    assert world.state.progress.reached == ()
 
 
 def test_hold_where_a_loiter_takes_more_than_there_is_leads_to_water_with_room():

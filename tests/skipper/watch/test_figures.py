@@ -436,6 +436,23 @@ def test_on_her_way_back_she_is_still_off_it_and_bound_elsewhere_it_is_not_asked
     assert measure(ctx, "dragged off") == figure
 
 
+@pytest.mark.parametrize(
+    ("nearest_m", "figure"),
+    [
+        (5.0, 100.0),  # she was there
+        (90.0, 0.0),  # she comes to it, round a corner
+        (70.0, 100.0),  # she has come no nearer, and leaves it
+    ],
+)
+def test_told_to_stay_she_is_off_her_place_once_there_or_leaving(nearest_m, figure):
+    there = route((0.0, 100.0))
+    ctx = moment(there, up=("leaking",), adrift={"nearest_m": nearest_m})
+    assert measure(ctx, "dragged off") == pytest.approx(figure)
+    assert measure(moment(there, adrift={"nearest_m": nearest_m}), "dragged off") is None, "she is to stay nowhere"
+    stopped = moment(there, up=("leaking",), adrift={"nearest_m": 5.0}, steering={"own_mode": Mode.LOITER})
+    assert measure(stopped, "dragged off") is None, "that loiter is elsewhere"
+
+
 def test_within_her_loiters_own_swing_she_is_at_her_place():
     """A boat of 4.5 m/s that turns by 10 degrees a second swings by 49 m, and was "dragged off" again and again."""
     rest = {"sailing": True, "over": "all goals are reached", "rest_en_m": (0.0, 55.0)}
