@@ -256,9 +256,10 @@ class MotionCheck:
         self.fits_s, self._tally = 0.0, _Tally()
         self.is_winds = heels or not now.is_heard or self._has_leapt(t_s)
         how = "astern" if now.along_mps < 0.0 else "ahead"
-        moves = f"she makes {abs(now.along_mps):.1f} m/s {how} where {now.speed_mps:.1f} m/s were to be expected"
+        # as past: it is said for as long as the doubt lasts
+        moves = f"she made {abs(now.along_mps):.1f} m/s {how} where {now.speed_mps:.1f} m/s were to be expected"
         if heels:
-            moves = f"she heels {math.degrees(abs(self._heel_rad)):.0f}° to windward"
+            moves = f"she heeled {math.degrees(abs(self._heel_rad)):.0f}° to windward"
         if self._has_leapt(t_s) and self._before_rad is not None:
             by = math.degrees(difference_rad(now.twd_from_rad, self._before_rad))
             self.doubt = f"the wind's direction leapt by {by:+.0f}° and {moves}: the vane was turned, or its offset"

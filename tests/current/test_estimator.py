@@ -150,7 +150,7 @@ def test_a_frozen_vane_is_held_against_how_she_moves_and_teaches_nothing(velocit
     for t in range(400, 440):
         now = replace(reading(float(t), 90.0, (0.0, 0.0)), is_heard=False, velocity_en_mps=velocity)
         estimator.update(float(t), None, now)
-    assert ("the vane is not believed, and she makes 1.1 m/s astern" in estimator.motion_doubt) is doubts
+    assert ("the vane is not believed, and she made 1.1 m/s astern" in estimator.motion_doubt) is doubts
     assert estimator.doubts_wind is doubts
     assert estimator.view().samples_s == before
 

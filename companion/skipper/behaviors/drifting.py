@@ -322,7 +322,8 @@ def _loiters(ctx: StepContext, ahead: DriftAhead | None) -> bool:
         return False
     what, until = "becalmed" if ctx.is_raised("becalmed") else "adrift", "she can sail"
     if ahead is None and _makes_way(ctx):
-        what, until = "out of the calm", "the wind has lasted"
+        is_calm = ctx.is_raised("becalmed") or not ctx.is_raised("drifting")
+        what, until = ("out of the calm", "the wind has lasted") if is_calm else ("adrift no more", "that has lasted")
     how = _motion(ctx) if ahead is None else ahead.sentence()
     if status.mode is Mode.LOITER and state.steering.own_mode is Mode.LOITER:
         place = memory.loiter_en_m if memory.loiter_en_m is not None else ctx.reckoned_en

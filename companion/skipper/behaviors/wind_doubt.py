@@ -128,8 +128,9 @@ def seeks_sea_room(ctx: StepContext) -> bool:
     if route.rung == SEA_ROOM and _is_on_the_way(ctx, water, boat, route.points_en_m[-1]):
         if state.steering.own_mode is not None:
             hand_back(ctx)
-        is_there = distance_m(boat, route.points_en_m[-1]) < STRAYS_M
-        ctx.phase(Phase.HOLDING, f"{ctx.snapshot.unsure}: {WAITS}" if is_there else route.why)
+        left_m = distance_m(boat, route.points_en_m[-1])
+        waits = WAITS if left_m < STRAYS_M else f"{left_m:.0f} m to where a loiter has more room; waiting until there"
+        ctx.phase(Phase.HOLDING, f"{ctx.snapshot.unsure}: {waits}")
         return True
     if (
         wind is None

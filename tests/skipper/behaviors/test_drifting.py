@@ -122,6 +122,16 @@ def test_in_a_loiter_who_makes_way_again_is_not_becalmed():
     assert ctx.state.why == told
 
 
+def test_in_a_loiter_who_makes_way_in_a_breeze_comes_out_of_no_calm():
+    """ "out of the calm" was said in 8 m/s of wind, after a drift by a wrong one."""
+    still = {"ground_en_mps": (0.0, 0.0), "ground_t_s": NOW_S, "loitered": True}
+    ctx = moment(speed_mps=2.7, tws_mps=8.0, up=("drifting",), adrift=still, steering={"own_mode": Mode.LOITER})
+    ctx.snapshot = replace(ctx.snapshot, autopilot=replace(ctx.snapshot.autopilot, mode=Mode.LOITER))
+    assert stops_drift(ctx)
+    told = "adrift no more, making 2.7 m/s towards 090°: waiting in a loiter until that has lasted"
+    assert ctx.state.why == told
+
+
 def test_over_the_missions_own_fence_the_call_for_the_anchor_goes_on():
     """It may be the shore: she was told 386 m clear of everything, and the calls ended, while she lay over it."""
     w = world(obstacles=(), voyage={"limits": box(-60.0, -60.0, 40.0, 600.0)})
