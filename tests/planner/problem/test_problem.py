@@ -66,7 +66,7 @@ def test_a_file_that_is_not_json(tmp_path):
     path.write_text("{", encoding="utf-8")
     with pytest.raises(InputError, match="not JSON"):
         Problem.from_json(path)
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="no such file; name a problem file"):
         Problem.from_json(tmp_path / "missing.json")
 
 
