@@ -25,6 +25,7 @@ NO_PLACES = {
     ("GoalProgress", "history"),  # carried over by hand
     ("Announced", "codes"),
     ("Alarms", "entering"),
+    ("Adrift", "bow_mps"),  # to starboard and ahead, whatever the frame
     ("GoalProgress", "covered"),
     ("Signs", "seen_s"),
     ("Persisted", "inside"),
