@@ -338,11 +338,16 @@ def codes(code: CodeType) -> Iterator[CodeType]:
             yield from codes(constant)
 
 
+def module_of(file: str) -> str:
+    """Return the name that a file is imported by."""
+    return ".".join(Path(file).with_suffix("").parts).removesuffix(".__init__")
+
+
 class OneFileChanged(importlib.abc.MetaPathFinder, importlib.abc.Loader):
     """Imports one module from changed code, all others as ever."""
 
     def __init__(self, file: str, code: CodeType) -> None:
-        self.name = ".".join(Path(file).with_suffix("").parts).removesuffix(".__init__")
+        self.name = module_of(file)
         self.path, self.code = ROOT / file, code
 
     def find_spec(self, fullname, _path=None, _target=None):
@@ -605,6 +610,8 @@ class Judge:
     def pytest_runtestloop(self, session):
         self.session = session
         self.items = {item.nodeid: item for item in session.items}
+        for file in self.texts:  # what is imported late, in a child, would come from the disk, and not be changed
+            importlib.import_module(module_of(file))
         for function in gc.get_objects():
             if type(function) is FunctionType:
                 self.functions[function.__code__.co_filename].append(function)

@@ -77,12 +77,26 @@ SAIL = """
 import json, sys
 from bench import mutants
 mutants.KEPT = mutants.Path(sys.argv[1])
-mutants.ROOMS = {"true wind": (("companion/wind/true_wind.py",), ("tests/wind/test_true_wind.py",))}
-wanted = json.loads(sys.argv[2])
+wanted, room, file, tests = json.loads(sys.argv[2]), *sys.argv[3:]
+mutants.ROOMS = {room: ((file,), (tests,))}
 whole = mutants.drawn
 mutants.drawn = lambda *asked: [m for m in whole(*asked) if m.told in wanted]
 raise SystemExit(mutants.main([]))
 """
+
+
+TRUE_WIND = ("true wind", "companion/wind/true_wind.py", "tests/wind/test_true_wind.py")
+LATE = ("formats", "companion/geofence/formats/kml.py", "tests/geofence/formats/test_parts.py")
+
+
+def test_a_module_that_is_imported_by_a_test_meets_its_mutant_too(tmp_path):
+    """It came from the disk in the child, unchanged, and each of its mutants survived."""
+    pytest.importorskip("coverage")
+    wanted = json.dumps(["role == 'track' -> role != 'track'"])
+    command = [sys.executable, "-c", SAIL, str(tmp_path), wanted, *LATE]
+    subprocess.run(command, cwd=mutants.ROOT, capture_output=True, check=True)
+    [verdict] = map(json.loads, (tmp_path / "mutants.jsonl").read_text().splitlines())
+    assert verdict["verdict"] == "killed"
 
 
 def test_a_child_meets_the_mutant_at_run_and_at_import_and_the_tree_does_not(tmp_path):
@@ -96,7 +110,7 @@ def test_a_child_meets_the_mutant_at_run_and_at_import_and_the_tree_does_not(tmp
     before = path.stat().st_mtime_ns
     for expected in (3, 3):  # what is known is not asked again
         done = subprocess.run(
-            [sys.executable, "-c", SAIL, str(tmp_path), json.dumps(wanted)],
+            [sys.executable, "-c", SAIL, str(tmp_path), json.dumps(wanted), *TRUE_WIND],
             cwd=mutants.ROOT,
             capture_output=True,
             text=True,
