@@ -10,7 +10,7 @@ from shapely.geometry import LineString, Polygon
 
 from companion.errors import InputError
 from companion.geofence.document import Code, Document, FindingLevel
-from companion.geofence.formats.fence_items import storage_bytes, zones_to_items
+from companion.geofence.formats.fence_items import items_to_zones, storage_bytes, zones_to_items
 from companion.geofence.formats.losses import Losses
 from companion.geofence.formats.registry import parse, write
 from companion.geofence.formats.rings import Findings, is_hopeless, odd_faces, polygons_from_rings
@@ -51,6 +51,12 @@ def test_a_missions_items_keep_their_parameters_height_frame_and_whether_they_go
     document = Document(items=ITEMS, home=HOME)
     back = read(text_of(document, name), f".{name}")
     assert (back.items, back.home) == (ITEMS, HOME)
+
+
+def test_home_stands_before_a_mission_at_a_height_above_the_sea():
+    first, second, *_ = text_of(Document(items=ITEMS, home=HOME), "waypoints").splitlines()[1:]
+    assert first.split("\t")[:4] == ["0", "1", "0", "16"]  # number, current, frame, command
+    assert second.split("\t")[:3] == ["1", "0", "0"]
 
 
 @pytest.mark.parametrize("name", ["geojson", "plan", "rally"])
@@ -114,6 +120,9 @@ def test_a_jump_of_qgroundcontrol_is_to_the_item_and_not_to_its_number_there():
     [finding] = read(plan_of(on, simple(177, 9, 1, 0, 0, 0, 0, 0)), ".plan").findings
     assert finding.severity is FindingLevel.ERROR
     assert "jumps to item 9" in finding.text
+    assert len(read(plan_of(there | {"doJumpId": 65535}), ".plan").items) == 1
+    with pytest.raises(InputError, match="doJumpId"):
+        read(plan_of(there | {"doJumpId": 65536}), ".plan")
 
 
 @pytest.mark.parametrize("where", ["inside", "beside"])
@@ -229,7 +238,7 @@ def test_of_a_ring_that_crosses_itself_the_faces_that_lie_inside_an_odd_number_o
     assert odd_faces(holed).area == pytest.approx(81.0 - 4.0)
 
 
-@pytest.mark.parametrize(("step", "is_tangle"), [(1, False), (10_001, True)])
+@pytest.mark.parametrize(("step", "is_tangle"), [(1, False), (2, False), (10_001, True)])
 def test_a_large_ring_is_a_tangle_where_it_crosses_itself_at_every_turn(step, is_tangle):
     n = 20_003
     t = 2.0 * math.pi * (step * np.arange(n) % n) / n  # a star of so many points, or a round
@@ -238,7 +247,42 @@ def test_a_large_ring_is_a_tangle_where_it_crosses_itself_at_every_turn(step, is
     assert not is_hopeless(few)
 
 
+@pytest.mark.parametrize(("wide_deg", "is_said"), [(2.0, False), (28.0, False), (32.0, True), (60.0, True)])
+def test_a_ring_across_the_antimeridian_is_worth_a_word_where_it_is_wider_than_a_bay(wide_deg, is_said):
+    west, east = 180.0 - wide_deg / 2.0, -180.0 + wide_deg / 2.0
+    found = Findings()
+    ring = [(west, 0.0), (east, 0.0), (east, 5.0), (west, 5.0), (west, 0.0)]
+    [polygon] = polygons_from_rings([ring], ZoneKind.EXCLUSION, "", found)
+    assert np.ptp(np.asarray(polygon.exterior.coords)[:, 0]) == pytest.approx(wide_deg)
+    assert [f.code for f in found] == ([Code.ANTIMERIDIAN] if is_said else [])
+
+
+def test_xml_that_is_none_is_told_with_what_is_wrong_and_where():
+    with pytest.raises(InputError, match=r"line 1 column 18: is not XML \(mismatched tag\)$"):
+        read("<kml><Document></Documents></kml>", ".kml")
+    with pytest.raises(InputError, match=r"is not XML \(no element found\); is the file cut off\?$"):
+        read("<kml><Document>", ".kml")
+
+
 # ------------------------------------------------------------------------------------------------ fence items
+@pytest.mark.parametrize("radius_m", [0.4, 1.0, 12.0])
+def test_a_small_circle_is_one_and_one_of_nothing_is_none(radius_m):
+    def circle(radius_m):
+        return item(50.8, -1.3, Command.NAV_FENCE_CIRCLE_EXCLUSION, params=(radius_m, 0.0, 0.0, 0.0))
+
+    found = Findings()
+    zones, _ = items_to_zones([circle(radius_m), circle(0.0)], found)
+    assert [z.shape.radius_m for z in zones] == [radius_m]
+    assert [(f.code, f.place) for f in found] == [(Code.DEGENERATE, "item 1")]
+    fence = {"version": 2, "polygons": [], "circles": []}
+    for radius in (radius_m, 0.0):
+        drawn = {"center": [50.8, -1.3], "radius": radius}
+        fence["circles"].append({"inclusion": False, "version": 1, "circle": drawn})
+    document = read(json.dumps(json.loads(plan_of()) | {"geoFence": fence}), ".plan")
+    assert [z.shape.radius_m for z in document.zones] == [radius_m]
+    assert [f.code for f in document.findings] == [Code.DEGENERATE]
+
+
 def test_a_vertex_without_a_count_takes_the_room_of_one_and_a_polygon_with_heights_that_of_its_vertices():
     lone = item(50.8, -1.3, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION, params=(0.0, 0.0, 0.0, 0.0))
     assert storage_bytes([lone]) == storage_bytes([lone, lone]) - 10 == 5 + 2 + 8
