@@ -14,7 +14,7 @@ from companion.planner import Problem, plan
 from companion.planner.explain import explain
 from companion.planner.plan import Plan
 from companion.planner.problem import defect_of, evaluate
-from companion.planner.risk.arrival import _Averaged, arrival, in_words, limits_in_words
+from companion.planner.risk.arrival import _Averaged, _smear, arrival, in_words, limits_in_words
 from tests.planner.problem_json import to_dict
 
 BOAT = Boat(polar=ardurover_sitl())
@@ -296,3 +296,14 @@ def test_where_she_may_never_arrive_the_boats_limit_is_asked_for_five_times_the_
     assert math.isinf(found.late_s)
     assert found.over_max == pytest.approx(strength.over(4.0, 5.0 * planned_s))
     assert found.over_max > 10.0 * strength.over(4.0, 4.9 * planned_s)
+
+
+def test_what_is_smeared_is_weighed_by_the_normal_density():
+    nodes = np.linspace(-2.0, 2.0, 9)
+    weights = _smear(nodes, 0.8)
+    assert weights.sum(axis=1) == pytest.approx(np.ones(9))
+    for n in range(9):
+        assert weights[n] / weights[n, n] == pytest.approx(
+            [math.exp(-0.5 * ((x - nodes[n]) / 0.8) ** 2) for x in nodes]
+        )
+    assert (_smear(nodes, 0.1) == np.eye(9)).all()

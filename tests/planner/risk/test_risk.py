@@ -1,6 +1,7 @@
 """The risk of a path: against simulated winds, against closed forms, and as a limit to plan within."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from hypothesis import strategies as st
 from bench.winds import simulate_entries
 from companion.planner import PlanStatus, Problem, plan
 from companion.planner.plan import Leg
-from companion.planner.risk import kernels
-from companion.planner.risk.chance_constraint import PROMISE_FACTOR, path_risk, process_of, widened, with_risk
+from companion.planner.risk import chance_constraint, kernels
+from companion.planner.risk.chance_constraint import PROMISE_FACTOR, _hazard, path_risk, process_of, widened, with_risk
 
 AR1 = {"model": "ar1", "sigma0_deg": 2.0, "sigma_inf_deg": 8.0, "rho_hz": 0.036}
 STILL = {"model": "ar1", "sigma0_deg": 8.0, "sigma_inf_deg": 8.0, "rho_hz": 0.02}
@@ -286,3 +287,22 @@ def test_widening_by_sigmas_widens_by_sigmas(sigma):
 def test_a_plan_without_a_path_has_no_risk():
     answer = plan(problem(obstacles=["POLYGON((-9 -9,9 -9,9 9,-9 9,-9 -9))"]), algorithm="rrtstar", expansions=10)
     assert with_risk(problem(), answer) is answer
+
+
+def test_what_is_promised_is_a_seventh_more_than_is_computed_and_never_more_than_certain(monkeypatch):
+    mild = path_risk(problem(STILL), legs((0, 60, 70)))
+    assert mild.wind == pytest.approx(1.15 * mild.computed)
+    assert 0.0 < mild.wind < 1.0
+    monkeypatch.setattr(chance_constraint, "tacks_at_risk", lambda problem, legs: (SimpleNamespace(risk=0.25),))
+    both = path_risk(problem(STILL), legs((0, 60, 70)))
+    assert both.total == pytest.approx(mild.wind + 0.25)
+    worst = path_risk(problem(STILL), legs((0, 600, 10)))
+    assert worst.wind == 1.0
+    assert worst.total == 1.0
+
+
+@pytest.mark.parametrize(
+    ("promised", "hazard"), [(0.0, 1e-9), (0.5, 0.5705), (1.0, 2.0369), (1.15, 20.723), (9.0, 20.723)]
+)
+def test_the_hazard_behind_a_promise_is_finite_whatever_is_promised(promised, hazard):
+    assert _hazard(promised) == pytest.approx(hazard, rel=1e-3)

@@ -14,7 +14,7 @@ from companion.planner import Problem, plan
 from companion.planner.problem import evaluate
 from companion.planner.problem.value import defect_of
 from companion.planner.risk.chance_constraint import path_risk
-from companion.planner.risk.tacks import TackAtRisk, in_words, of_risky, tacks_at_risk
+from companion.planner.risk.tacks import TackAtRisk, _Solids, in_words, of_risky, tacks_at_risk
 from companion.planner.solve import CONTACT_S, DEARER
 from tests.planner.problem_json import to_dict
 
@@ -247,3 +247,13 @@ def test_a_tack_that_may_touch_is_told_with_how_often_it_has_to_fail():
     assert told[0] == "A tack that fails once at 20 E, -31 N would bring her onto something: 30 % at 30 % for one."
     assert "fails 2 times in a row" in told[1]
     assert "9 % at 30 % for one" in told[1]
+
+
+@pytest.mark.parametrize("tws_mps", [5.0, None])
+def test_how_far_a_failed_tack_reaches_is_asked_in_the_wind_of_the_plan(monkeypatch, tws_mps):
+    asked = []
+    monkeypatch.setattr(_Solids, "far_m", lambda self, speed_mps, tws: asked.append(tws) or 0.0)
+    p = channel()
+    p = replace(p, wind=replace(p.wind, tws_mps=tws_mps))
+    assert _Solids(p).tack(p, 0, (0.0, 100.0), 0.8, 2.0, 0.3) is None
+    assert asked == [tws_mps or 0.0]
