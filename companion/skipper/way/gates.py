@@ -36,7 +36,9 @@ from companion.skipper.way.line import (
 from companion.skipper.way.sweeps import Sweep
 from companion.skipper.way.voyage import AreaLike, Box, Composed, Goal, Line, PointEn, Search, Side, Voyage
 
-ARC_RAD = math.radians(100.0)  # gates around a buoy are at most this far apart
+# Gates around a buoy are at most this far apart. The chord between two keeps clear of it (``KEEP_SHARE``); a chain of
+# shorter ones is sailed in a loop: she overtakes the point that is led along it, and turns back to it over the buoy.
+ARC_RAD = math.radians(115.0)
 STRAIGHT_RAD = math.radians(60.0)  # a bend the other way up to this is passed with one gate, not with a loop
 SHORT_RAD = math.radians(30.0)  # the autopilot cuts corners: a gate counts this much short of it, going on round
 PAST_RAD = math.radians(60.0)  # the last gate of a buoy that nothing leads on from lies so far past abeam

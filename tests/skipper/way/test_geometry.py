@@ -12,6 +12,7 @@ from shapely.geometry import LineString, box
 
 from companion.geo.angles import difference_rad
 from companion.skipper.way.gates import (
+    KEEP_SHARE,
     PAST_RAD,
     Approach,
     again,
@@ -258,3 +259,19 @@ def test_a_turn_that_is_wider_than_a_dock_is_no_way_out_of_it(half_m, head_m, ra
         walls += [box(-half_m - 10.0, -200.0, -half_m, head_m), box(half_m, -200.0, half_m + 10.0, head_m)]
     out = has_way_out(area(*walls), (0.0, 0.0), course_rad, radius_m=radius_m, reach_m=1.0)
     assert out is is_out
+
+
+@pytest.mark.parametrize("turn_deg", [100.0, 105.0, 112.0])
+def test_round_a_buoy_there_are_no_more_gates_than_it_takes_to_keep_clear_of_it(turn_deg):
+    """With three for 112 degrees the legs between them were 7.5 m long: at 3.4 m/s she looped over the buoy."""
+    buoy = Goal(en_m=(0.0, 200.0), radius_m=6.0, side=Side.STARBOARD, rounding_m=8.0, name="R")
+    off = math.radians(180.0 - turn_deg)
+    after = Goal(en_m=(-200.0 * math.sin(off), 200.0 - 200.0 * math.cos(off)), radius_m=10.0)
+    mirrored = replace(after, en_m=(-after.en_m[0], after.en_m[1]))
+    begin, seen = Approach(goal=0, en_m=(0.0, 0.0)), 0
+    for course in ((buoy, after), (buoy, mirrored)):
+        legs = list(pairwise(gate.en_m for gate in gates_of(voyage(*course), (begin,)) if gate.goal == 0))
+        seen += len(legs)
+        assert min((leg_distance_m(buoy.en_m, *leg) for leg in legs), default=math.inf) >= KEEP_SHARE * buoy.rounding_m
+        assert min((distance_m(*leg) for leg in legs), default=math.inf) > 10.0
+    assert seen > 0
