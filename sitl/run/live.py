@@ -253,17 +253,16 @@ def run_live(
             nothing.
     """
     kind = RealBoat if autopilot == "ardurover" else SimulatedBoat
+    asked = "--autopilot ardurover" if autopilot == "ardurover" else "--live" if cpu is None else "--cpu"
     cannot = sorted({e.kind for e in scenario.events} - OURS - kind.plays)
     if cannot:
         raise JobError(
-            f"{scenario.name}: {', '.join(cannot)} can be played by the embedded autopilot only; leave out "
-            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}"
+            f"{scenario.name}: {', '.join(cannot)} can be played by the embedded autopilot only; leave out {asked}"
         )
     unlike = kind.cannot_be(scenario)
     if unlike:
         raise JobError(
-            f"{scenario.name}: {', '.join(unlike)} can be had of the embedded autopilot only; leave out "
-            f"{'--autopilot ardurover' if autopilot == 'ardurover' else '--live'}"
+            f"{scenario.name}: {', '.join(unlike)} can be had of the embedded autopilot only; leave out {asked}"
         )
     pace = speedup or scenario.speedup
     track = TrueTrack() if truth is None else truth

@@ -188,14 +188,16 @@ def test_a_scenario_is_not_sailed_into_the_folder_of_another_voyage(tmp_path, ca
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "event"), [(["--live"], "gps_jump"), (["--autopilot", "ardurover"], "kill_planner")]
+    ("autopilot", "event"),
+    [(["--live"], "gps_jump"), (["--cpu", "0.5"], "gps_jump"), (["--autopilot", "ardurover"], "kill_planner")],
 )
 def test_a_scenario_that_cannot_be_played_live_says_so_first(tmp_path, capsys, autopilot, event):
     mission = Path("missions/archipelago.toml").resolve()
     path, out = tmp_path / "odd.toml", tmp_path / "voyage"
     path.write_text(f'name = "odd"\nmission = "{mission}"\n[[events]]\nat_s = 9.0\nkind = "{event}"\n')
     assert sitl_cli.main(["run", str(path), *autopilot, "--out", str(out)]) == 1
-    assert f"odd: {event} can be played by the embedded autopilot only" in capsys.readouterr().err
+    told = f"odd: {event} can be played by the embedded autopilot only; leave out {autopilot[0]}"
+    assert told in capsys.readouterr().err
     assert not out.exists()
 
 
