@@ -147,7 +147,7 @@ def test_a_report_survives_its_record(report):
 def test_four_ships_at_once_and_the_paths_look_alike(tmp_path):
     """Büsser 2009, 5.2: no replanning more often than every 20 s; a path that is safe stays or changes little."""
     path = Path("sitl/scenarios/four-ships.toml")
-    verdict = run_virtual(run_embedded(load_scenario(path), path, 0, tmp_path))
+    verdict = run_virtual(run_embedded(load_scenario(path), path, 1, tmp_path))
     assert verdict.passed, failed(verdict)
     records = decisions(tmp_path)
     asked = [d["t_s"] for d in records if d.get("action") == "RequestPlan" and not d["rung"]]

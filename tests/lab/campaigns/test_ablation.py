@@ -65,8 +65,9 @@ def test_the_voyage_is_planned_so(tmp_path, name, is_certain):
     scenario = load_scenario(UPWIND)
     run_virtual(run_embedded(scenario, UPWIND, 0, tmp_path, variation=VARIATIONS[name]))
     rows = [json.loads(line) for line in (tmp_path / "decisions.jsonl").read_text().splitlines()]
-    half = [
-        leg["no_go_half_deg"]
+    shown = {row["request_id"]: row["leeway_deg"] for row in rows if row.get("action") == "RequestPlan"}
+    half = [  # without what the boat has shown of her leeway, which is no spread
+        leg["no_go_half_deg"] - shown[row["request_id"]]
         for row in rows
         if row["kind"] == "plan" and row.get("plan")
         for leg in row["plan"]["legs"]
