@@ -91,7 +91,9 @@ def test_told_to_hold_a_boat_that_sails_off_is_alarmed_turned_once_and_counts_no
         assert [raised.name for raised in world.state.alarms.raised] == ["dragged off"]
         assert world.run(5, lambda w: w.mode is Mode.LOITER)
         assert "staying near by" not in world.state.why
+        began_s = world.t
         assert world.run(60, lambda w: w.mode is Mode.AUTO), "what does not turn in LOITER turns nowhere"
+        assert world.t - began_s > 10.0, "it is kept while she turns"
         assert world.run(120, lambda w: distance_m(w.position, goal.en_m) < 3.0)
         assert "m off the place where she is to stay: ordered by" in world.state.why
         assert [a.mode for _, a in world.actions if isinstance(a, act.SetMode)][-2:] == [Mode.LOITER, Mode.AUTO]
