@@ -99,7 +99,7 @@ BEHAVIORS: tuple[Behavior, ...] = (
     Behavior(
         name="keep off",
         act=keeps_off,
-        when="a way that is not ours to plan leads over something near by",
+        when="a way that is not of our planning leads over something near by",
         does="asks for LOITER",
     ),
     Behavior(

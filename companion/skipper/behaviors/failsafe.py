@@ -35,7 +35,10 @@ from companion.skipper.way import PointEn, bearing_rad, distance_m, moved
 TOLD_S = 5.0  # a sign this long before or after the change of mode belongs to it
 ASKED_S = 30.0  # an AUTO that shows so long after it was accepted is the one that was asked for
 FILTER_S = 30.0  # a heartbeat that is critical so soon after the filter failed is critical because of it
-NEAR_S = 25.0  # somebody else's way is let be until what it leads over is so near: a LOITER needs half of it
+NEAR_S = 25.0  # somebody else's way is let be until what it leads over is so near ...
+LOITER_S = (
+    0.5 * NEAR_S
+)  # ... for a LOITER needs half of it; while a way of ours is on its way to the autopilot, until then
 SLOW_MPS = 1.0
 HULL_M = 2.0  # the way of the boat's antenna is not that of its hull
 CLOSER_M = 1.0  # what leads away from something is let be
@@ -161,11 +164,9 @@ def _cause(stop: Stop, signs: Signs) -> str:
 
 def take_over(ctx: StepContext) -> bool:
     """Make a failsafe's stop ours to end, where the table and the operator allow it; False: somebody else's."""
-    stop, may = ctx.state.operator.stop, ctx.snapshot.permissions
-    if stop is None or not stop.is_armed or stop.cause == PERSON or not (may.may_set_mode and may.may_upload):
-        return False
-    answer = ctx.config.ends.answer(stop.cause)
-    if answer is None or answer is Recovery.LEAVE or stop.mode is None:
+    stop = ctx.state.operator.stop
+    answer = _answer(ctx)
+    if stop is None or answer is None or stop.mode is None:
         return False
     ctx.set(
         steering=changed(ctx.state.steering, own_mode=stop.mode),
@@ -184,34 +185,53 @@ def take_over(ctx: StepContext) -> bool:
     return True
 
 
+def _answer(ctx: StepContext) -> Recovery | None:
+    """Return what ends the stop, None where that is not ours to do."""
+    stop, may = ctx.state.operator.stop, ctx.snapshot.permissions
+    if stop is None or not stop.is_armed or stop.cause == PERSON or not (may.may_set_mode and may.may_upload):
+        return None
+    answer = ctx.config.ends.answer(stop.cause)
+    return None if answer is Recovery.LEAVE else answer
+
+
 def keeps_off(ctx: StepContext) -> bool:
-    """Loiter before the hull touches, where somebody else's way is sailed that is not ours to plan; True: it is asked.
+    """Loiter before the hull touches, where a way is sailed that is not of our planning; True: it is asked.
 
     A mission that is not ours stays on board, and so does a mode that a person set. But legs that lead over something
     solid, and a failsafe's straight way home, are nobody's wish. Once: who sets AUTO again has been told, and means it.
     Not where drawings are adopted: there somebody at the helm has just drawn this way, it is on offer, and a boat that
-    loiters beside what it leads over is no place to begin the voyage that comes of it.
+    loiters beside what it leads over is no place to begin the voyage that comes of it. Out of a failsafe that is
+    answered a way of ours leads; a slow link may bring it to the autopilot too late.
     """
     boat, vehicle = ctx.boat_en, ctx.snapshot.vehicle
+    is_answer = not ctx.state.mission.foreign and _answer(ctx) is not None
     whose, way = _others_way(ctx)
-    if boat is None or vehicle is None or not way or ctx.config.adopts or ctx.is_said(KEPT_OFF, KEPT_OFF_S):
+    if boat is None or vehicle is None or not way:
         return False
-    near = _begin([boat, *way], NEAR_S * max(vehicle.speed_mps, SLOW_MPS))
+    if not is_answer and (ctx.config.adopts or ctx.is_said(KEPT_OFF, KEPT_OFF_S)):
+        return False
+    near = _begin([boat, *way], (LOITER_S if is_answer else NEAR_S) * max(vehicle.speed_mps, SLOW_MPS))
     solid = ctx.voyage.area.unfenced
     if solid.path_clearance_m(near) > min(HULL_M, float(solid.clearance_m([boat])[0]) - CLOSER_M):
         return False
     text = f"{whose} leads over {ctx.voyage.area.nearest_name(near[-1]) or 'something'}: loitering"
+    if is_answer:
+        text += ", waiting for our own way to be on board"
     if not set_mode(ctx, Mode.LOITER, text):
         return False
+    if is_answer:
+        ctx.phase(Phase.HOLDING, text)
+        ctx.say(Severity.WARNING, KEPT_OFF, text, every_s=0.0)
+        return True
     ctx.phase(Phase.HOLDING, f"{text}; waiting for a person")
     ctx.say(Severity.CRITICAL, KEPT_OFF, f"{text}; take her in MANUAL, or AUTO if it is meant", every_s=0.0)
     return True
 
 
 def _others_way(ctx: StepContext) -> tuple[str, list[PointEn]]:
-    """Return whose way is sailed that is not ours to plan, and its points ahead; none where it is ours, or no way."""
+    """Return whose way is sailed that is not of our planning, and its points ahead; none where it is ours."""
     state, stop, status = ctx.state, ctx.state.operator.stop, ctx.autopilot
-    if status is None or not status.is_armed or not (state.mission.foreign or not ctx.snapshot.permissions.may_upload):
+    if status is None or not status.is_armed:
         return "", []
     aboard = state.mission.read_items
     if status.mode is Mode.AUTO and state.mission.foreign and aboard is not None and status.mission_seq:

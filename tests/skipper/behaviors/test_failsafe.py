@@ -454,3 +454,23 @@ def test_a_failsafe_s_way_home_over_something_is_loitered_before_where_a_strange
     world.run(4)
     assert world.mode is Mode.LOITER
     assert "straight way home of the fence failsafe leads over" in said(world, "kept off")[0][2]
+
+
+@pytest.mark.parametrize("plan_s", [1.0, 30.0])
+def test_a_failsafe_does_not_sail_her_home_over_something_while_our_own_way_is_not_there_yet(plan_s):
+    behind = under_way(obstacles=(box(15, -40, 45, 40), box(200, -40, 230, 40))).skipper
+    world = under_way(obstacles=())
+    assert world.run(120, lambda w: w.position[0] > 90.0)
+    world.skipper, world.plan_s = behind, plan_s
+    stop(world, Mode.RTL, fence_breached=True, waypoint_distance_m=90.0, target_bearing_rad=-0.5 * math.pi)
+    world.drift_mps = 0.0
+    modes, nearest_m = [], math.inf
+    for _ in range(60):
+        world.run(1)
+        if world.mode is Mode.RTL:  # the autopilot sails home
+            world.position = (world.position[0] - 2.0, world.position[1])
+        modes.append(world.mode)
+        nearest_m = min(nearest_m, float(world.skipper.voyage.area.clearance_m([world.position])[0]))
+    assert (Mode.LOITER in modes) is (plan_s > 10.0)
+    assert (Mode.AUTO in modes) is (plan_s < 10.0)
+    assert nearest_m > 2.0

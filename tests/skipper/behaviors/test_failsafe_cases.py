@@ -364,6 +364,33 @@ def test_the_straight_way_home_is_nobody_s_wish(mode, cause, may_upload, far_m, 
     assert keeps_off(ctx) is keeps
 
 
+@pytest.mark.parametrize(
+    ("ends", "east_m", "may_set_mode", "told_s", "keeps"),
+    [
+        (Ends(), 3.1, True, 60.0, True),  # 12.5 s at 2 m/s, and the hull's 2 m; the first one was no more meant
+        (Ends(), 2.9, True, 60.0, False),  # our own way is on board sooner
+        (Ends(), 3.1, False, 60.0, False),
+        (Ends.of(fence_failsafe="leave"), -21.9, True, 1801.0, True),  # nobody plans a way out of it
+        (Ends.of(fence_failsafe="leave"), -21.9, True, 60.0, False),
+    ],
+)
+def test_a_straight_way_home_that_is_answered_is_stopped_on_where_our_own_comes_too_late(
+    ends, east_m, may_set_mode, told_s, keeps
+):
+    ctx = seen(
+        Mode.RTL,
+        stop=stopped(Mode.RTL, cause="fence"),
+        at=(east_m, 0.0),
+        speed_mps=2.0,
+        obstacles=(ROCK,),
+        config={"ends": ends},
+        permissions=replace(ALL_PERMITTED, may_set_mode=may_set_mode),
+        announced={"codes": (("kept off", NOW_S - told_s),)},
+        status={"waypoint_distance_m": 300.0, "target_bearing_rad": math.radians(90.0)},
+    )
+    assert keeps_off(ctx) is keeps
+
+
 def test_the_beginning_of_a_way():
     way = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)]
     assert _begin(way, 4.0) == [(0.0, 0.0), pytest.approx((4.0, 0.0))]
