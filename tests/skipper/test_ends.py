@@ -437,6 +437,18 @@ def test_a_station_is_kept_at_the_last_goal_before_she_sails_home():
     assert world.t - began > 90.0
 
 
+def test_a_restart_does_not_begin_her_station_anew():
+    world = make(BEHIND, **{**ASIDE, "config": {"station_s": 200.0}})
+    world.shown = {"utc_at_boot_s": 1.8e9}
+    assert world.run(900, lambda w: "keeping station" in w.state.why)
+    began = world.t
+    world.run(120)
+    restarted(world)
+    assert world.run(60, lambda w: "keeping station" in w.state.why)
+    assert world.run(300, is_done)
+    assert 195.0 < world.t - began < 230.0
+
+
 def test_ordered_elsewhere_from_a_station_and_told_to_go_on_she_goes_back_to_it():
     world = make(
         BEHIND,

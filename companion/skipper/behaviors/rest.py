@@ -31,6 +31,7 @@ from companion.skipper.planning.diversions import (
     station_left_s,
 )
 from companion.skipper.step import Diversion, DiversionKind, Phase, Route, SafeEnd, StepContext
+from companion.skipper.step.state import Since
 from companion.skipper.way import bearing_rad, distance_m
 from companion.words import goals_reached
 
@@ -124,8 +125,8 @@ def turns_back_to_place(ctx: StepContext) -> bool:
 def _begin_station(ctx: StepContext, bound: Diversion) -> None:
     """Say that the boat stays at the last goal, which is for as long as the mission asks from the first time on."""
     boat, voyage = ctx.boat_en, ctx.state.voyage
-    if voyage.station_since_s is None:
-        ctx.set(voyage=changed(voyage, station_since_s=ctx.t_s))
+    if voyage.station_since is None:
+        ctx.set(voyage=changed(voyage, station_since=Since(t_s=ctx.t_s, utc_s=ctx.utc_s)))
     off = "" if boat is None else f", {distance_m(boat, bound.en_m):.0f} m off"
     ctx.phase(Phase.HOLDING, f"keeping station: waiting {bound.until}{off}")
 

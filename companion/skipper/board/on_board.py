@@ -17,7 +17,7 @@ from companion.safety import STOPPING
 from companion.skipper.board.mark import are_marked, marked
 from companion.skipper.step import AdoptDrawing, Persisted, Phase, ReadMission, Route, StepContext
 from companion.skipper.step.missions import HELD_BACK, NO_PLAN, held_back, is_mixture, is_same_mission
-from companion.skipper.step.state import Inside, saved_of
+from companion.skipper.step.state import Inside, Since, saved_of
 from companion.words import counted
 
 REMEDY = "it is not resumed; waiting for [operator] replace_foreign, or an order, to allow its replacement"
@@ -233,7 +233,11 @@ def _take_up(ctx: StepContext, saved: Persisted) -> None:
             searched=saved.searched,
             covered=saved.covered,
             reached=saved.reached,
-        )
+        ),
+        voyage=changed(
+            ctx.state.voyage,
+            station_since=None if saved.station_utc_s is None else Since(t_s=ctx.t_s, utc_s=saved.station_utc_s),
+        ),
     )
 
 

@@ -61,6 +61,7 @@ def resumed(voyage: Voyage, saved: Persisted) -> tuple[Persisted, str]:
         approaches=approaches,
         quarters=saved.quarters if stays else 0,
         inside=saved.inside if is_there else None,
+        station_utc_s=None,  # the last goal is another one
         searched=saved.searched if same > saved.leg else (),
         covered=tuple(c for c in saved.covered if c[0] < same),
     )

@@ -465,8 +465,8 @@ def _home(ctx: StepContext, why: str) -> Diversion | None:
 
 def station_left_s(ctx: StepContext) -> float:
     """Return how long the boat is to stay at the last goal yet [s], 0: not at all, or no longer."""
-    since_s = ctx.state.voyage.station_since_s
-    return max(0.0, ctx.config.station_s - (0.0 if since_s is None else ctx.t_s - since_s))
+    since = ctx.state.voyage.station_since
+    return max(0.0, ctx.config.station_s - (0.0 if since is None else since.age_s(ctx.t_s, ctx.utc_s)))
 
 
 def _on_station(ctx: StepContext) -> Diversion | None:

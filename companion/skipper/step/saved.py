@@ -142,6 +142,7 @@ class Persisted:
     skipped: int = 0  # goals given up: by order, and boxes that she could not stay in
     set_sail_utc_s: float | None = None  # Unix time of setting sail
     inside: tuple[int, float] | None = None  # the goal whose box the boat stays in, Unix time of entry
+    station_utc_s: float | None = None  # Unix time of the beginning of her stay at the last goal
     searched: tuple[tuple[float, float], ...] = ()  # the track of the search that is next
     covered: tuple[tuple[int, float], ...] = ()  # goals searched, and the share that was seen
     tacks: tuple[int, int] = (0, 0)  # tried, and of these failed
@@ -189,6 +190,7 @@ class Persisted:
             "skipped": self.skipped,
             "set_sail_utc_s": self.set_sail_utc_s,
             "inside": None if self.inside is None else list(self.inside),
+            "station_utc_s": self.station_utc_s,
             "searched": [list(p) for p in self.searched],
             "covered": [list(c) for c in self.covered],
             "tacks": list(self.tacks),
@@ -235,6 +237,7 @@ class Persisted:
                 inside=None
                 if data.get("inside") is None
                 else (_whole(data["inside"][0], 0, MAX_GOALS), _number(data["inside"][1])),
+                station_utc_s=None if data.get("station_utc_s") is None else _number(data["station_utc_s"]),
                 searched=tuple((_metres(e), _metres(n)) for e, n in data.get("searched", ())[:MAX_POINTS]),
                 covered=tuple((_whole(g, 0, MAX_GOALS), _number(s)) for g, s in data.get("covered", ())[:MAX_GOALS]),
                 tacks=_tacks(data.get("tacks", (0, 0))),

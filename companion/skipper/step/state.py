@@ -262,16 +262,22 @@ class Fallback:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Inside:
-    """Since when the boat is in a goal's box, or sails by its field, and by the autopilot's clock (None: not known)."""
+class Since:
+    """When something began, and by the autopilot's clock (None: not known)."""
 
-    goal: int
     t_s: float
     utc_s: float | None = None
 
     def age_s(self, t_s: float, utc_s: float | None) -> float:
         """Return how long ago that was [s]; over a restart only the clock can tell."""
         return t_s - self.t_s if utc_s is None or self.utc_s is None else utc_s - self.utc_s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Inside(Since):
+    """Since when the boat is in a goal's box, or sails by its field."""
+
+    goal: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -366,7 +372,7 @@ class VoyageState:
     over: str = ""  # why the voyage is over: what is left is to watch its loiter; empty: it is not
     arrived: bool = False  # ... with all goals reached, and home where the mission ends there
     rest_en_m: PointEn | None = None  # where the boat loiters since
-    station_since_s: float | None = None  # when she began to stay at the last goal for as long as the mission asks
+    station_since: Since | None = None  # when she began to stay at the last goal for as long as the mission asks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -548,6 +554,7 @@ def saved_of(state: SkipperState, voyage: str) -> Persisted:
         inside=None
         if state.progress.inside is None or state.progress.inside.utc_s is None
         else (state.progress.inside.goal, state.progress.inside.utc_s),
+        station_utc_s=None if state.voyage.station_since is None else state.voyage.station_since.utc_s,
         searched=state.progress.searched[:-1],
         covered=state.progress.covered,  # the last point moves with the boat
         tacks=(state.tacking.tried, state.tacking.failed),
