@@ -6,7 +6,7 @@ import csv
 import gzip
 import hashlib
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,13 @@ class Skipped:
 
     name: str
     why: str
+
+
+def why_none(names: Sequence[Path], skipped: Sequence[Skipped]) -> str:
+    """Return why no log is of use, where there was one at the most under these names: its name, and the reason."""
+    if not skipped:
+        return f"{', '.join(map(str, names))}: no log is in there"
+    return f"{skipped[0].name}: {skipped[0].why}"
 
 
 def logs_under(names: list[Path]) -> list[Path]:

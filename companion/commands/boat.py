@@ -147,7 +147,7 @@ def _guess(args: argparse.Namespace) -> int:
 
 def _learn(args: argparse.Namespace) -> int:
     from companion.boat import learned_text, lesson_of
-    from companion.boat_logs import Skipped, logs_under, read_logs
+    from companion.boat_logs import Skipped, logs_under, read_logs, why_none
     from companion.commands.output import refuse_existing, write_files
     from companion.compose import polar_of_file, speed_error_of
     from companion.errors import JobError
@@ -166,10 +166,7 @@ def _learn(args: argparse.Namespace) -> int:
     skipped += [Skipped(name=one.log.name, why=old) for one in read if one.digest in known]
     read = [one for one in read if one.digest not in known]
     if not read and len(skipped) < 2:
-        name, why = (
-            (skipped[0].name, skipped[0].why) if skipped else (", ".join(map(str, args.logs)), "no log is in there")
-        )
-        raise JobError(f"{name}: {why}; {_TAKES}")
+        raise JobError(f"{why_none(args.logs, skipped)}; {_TAKES}")
     for left in skipped:
         print(f"skipped {left.name}: {left.why}")
     for one in read:

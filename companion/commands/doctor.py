@@ -168,14 +168,13 @@ def _print(findings: Sequence[DoctorFinding], changes: Sequence[ParameterFix], a
 def steering_in(paths: Sequence[Path]) -> Steering:
     """Return how the autopilot steered in all logs under these paths; say which tell nothing of it. Raises JobError."""
     from companion.boat import steering_of
-    from companion.boat_logs import logs_under, read_steering
+    from companion.boat_logs import logs_under, read_steering, why_none
     from companion.errors import JobError
 
     logs, skipped = read_steering(logs_under(list(paths)))
     takes = "give .BIN or .tlog of a voyage, or its folder"
     if not logs and len(skipped) < 2:
-        name, why = (skipped[0].name, skipped[0].why) if skipped else (", ".join(map(str, paths)), "no log is in there")
-        raise JobError(f"{name}: {why}; {takes}")
+        raise JobError(f"{why_none(paths, skipped)}; {takes}")
     for left in skipped:
         print(f"skipped {left.name}: {left.why}", file=sys.stderr)
     if not logs:
