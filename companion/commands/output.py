@@ -109,7 +109,7 @@ def patience(doing: str, why: str = "") -> Iterator[None]:
     def say() -> None:
         once = [
             what
-            for what, is_so in (("kernels are compiled", begun() > before), ("fonts are listed", _are_fonts_listed()))
+            for what, is_so in (("kernels are compiled", begun() > before), ("fonts are listed", _fonts_are_unlisted()))
             if is_so
         ]
         because = f"{listed(once)}, once on each machine" if once else why
@@ -124,7 +124,7 @@ def patience(doing: str, why: str = "") -> Iterator[None]:
         waiting.cancel()
 
 
-def _are_fonts_listed() -> bool:
+def _fonts_are_unlisted() -> bool:
     """Return whether matplotlib, which is here to draw, has kept no list of the machine's fonts yet."""
     folder = getattr(sys.modules.get("matplotlib"), "get_cachedir", None)
     return folder is not None and not any(Path(folder()).glob("fontlist-*.json"))
