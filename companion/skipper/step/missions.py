@@ -22,8 +22,8 @@ from companion.skipper.step.config import SkipperConfig
 from companion.skipper.step.route import Route
 from companion.skipper.way import PointEn, Voyage, bearing_rad, distance_m, moved, water_at
 from companion.skipper.way.drift import floor_from_m
-from companion.skipper.way.gates import Mark, marks_of
-from companion.skipper.way.geometry import leg_distance_m
+from companion.skipper.way.gates import marks_of
+from companion.skipper.way.geometry import Mark, leg_distance_m
 from companion.skipper.way.shortest import way_m
 from companion.skipper.way.voyage import AreaLike, water_to_keep
 

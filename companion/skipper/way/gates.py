@@ -16,10 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
 
 from companion.geo.angles import difference_rad, wrap_pi
-from companion.skipper.way.geometry import Barrier, barrier, bearing_rad, disc_wkt, distance_m, has_way_out, moved
+from companion.skipper.way.geometry import Barrier, Mark, barrier, bearing_rad, distance_m, has_way_out, moved
 from companion.skipper.way.line import (
     BEFORE_M,
     STRAY_M,
@@ -194,19 +193,6 @@ def is_dead_end(gate: Gate, area: AreaLike, *, radius_m: float, reach_m: float) 
     return not has_way_out(area, gate.en_m, course, radius_m=radius_m, reach_m=reach_m)
 
 
-class Mark(NamedTuple):
-    """A buoy, or an end of a line: how far every way keeps clear of it [m], and what it is called in sentences."""
-
-    en_m: PointEn
-    keep_m: float
-    name: str = "a mark"
-
-    @property
-    def disc_wkt(self) -> str:
-        """What is kept out of, as WKT."""
-        return disc_wkt(self.en_m, self.keep_m)
-
-
 def marks_of(voyage: Voyage, stray_m: float = STRAY_M) -> tuple[Mark, ...]:
     """Return every mark of the voyage: buoys, and the ends of lines.
 
@@ -245,10 +231,10 @@ def _sweep(goal: Goal, index: int, name: str, approach: Approach) -> list[Gate]:
     ]
 
 
-def _other_marks(voyage: Voyage, goal: Goal) -> list[tuple[PointEn, float]]:
-    """Return the marks of all goals but a line's own, with what is kept clear of each [m]."""
+def _other_marks(voyage: Voyage, goal: Goal) -> list[Mark]:
+    """Return the marks of all goals but a line's own."""
     own = () if goal.line is None else (goal.line.port_en_m, goal.line.starboard_en_m)
-    return [(mark.en_m, mark.keep_m) for mark in marks_of(voyage) if mark.en_m not in own]
+    return [mark for mark in marks_of(voyage) if mark.en_m not in own]
 
 
 def _cross(
@@ -258,7 +244,7 @@ def _cross(
     before: PointEn | None,
     after: PointEn | None,
     area: AreaLike,
-    marks: list[tuple[PointEn, float]],
+    marks: Sequence[Mark],
 ) -> list[Gate]:
     """Return the gates that cross a line: a place beyond it, and one before it where the way begins elsewhere."""
     line = goal.line

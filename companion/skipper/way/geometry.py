@@ -94,6 +94,19 @@ def disc_wkt(center: PointEn, radius_m: float) -> str:
     return polygon_wkt(ring)
 
 
+class Mark(NamedTuple):
+    """A buoy, or an end of a line: how far every way keeps clear of it [m], and what it is called in sentences."""
+
+    en_m: PointEn
+    keep_m: float
+    name: str = "a mark"
+
+    @property
+    def disc_wkt(self) -> str:
+        """What is kept out of, as WKT."""
+        return disc_wkt(self.en_m, self.keep_m)
+
+
 class Barrier(NamedTuple):
     """What is kept out of on one way only, as a WKT polygon, and what it is called in sentences."""
 

@@ -15,7 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.skipper.way.geometry import Barrier, along_m, barrier, bearing_rad, cross_track_m, distance_m, moved
+from companion.skipper.way.geometry import (
+    Barrier,
+    Mark,
+    along_m,
+    barrier,
+    bearing_rad,
+    cross_track_m,
+    distance_m,
+    moved,
+)
 from companion.skipper.way.voyage import AreaLike, Line, PointEn
 
 BEFORE_M = 25.0  # the place before the line: room to settle on the course across it
@@ -114,24 +123,20 @@ def foot_en(line: Line, point: PointEn) -> PointEn:
     return _on_line(line, along_m(point, line.port_en_m, line.starboard_en_m))
 
 
-Marks = Sequence[tuple[PointEn, float]]
-"""Marks of other goals: where each is, and how far every way keeps clear of it [m]."""
-
-
-def place_beyond(line: Line, cut_en: PointEn, area: AreaLike, marks: Marks = ()) -> tuple[PointEn, float]:
+def place_beyond(line: Line, cut_en: PointEn, area: AreaLike, marks: Sequence[Mark] = ()) -> tuple[PointEn, float]:
     """Return the place beyond the line that the way across it at ``cut_en`` leads to, and its radius [m]."""
     place, off_m = _place(line, cut_en, area, marks, course_rad(line), BEYOND_M, BEYOND_LEAST_M)
     return place, min(BEYOND_RADIUS_M, RADIUS_SHARE * off_m)
 
 
-def place_before(line: Line, cut_en: PointEn, area: AreaLike, marks: Marks = ()) -> tuple[PointEn, float]:
+def place_before(line: Line, cut_en: PointEn, area: AreaLike, marks: Sequence[Mark] = ()) -> tuple[PointEn, float]:
     """Return the place before the line where the way across it at ``cut_en`` begins, and its radius [m]."""
     place, off_m = _place(line, cut_en, area, marks, course_rad(line) + math.pi, BEFORE_M, BEFORE_LEAST_M)
     return place, min(BEFORE_RADIUS_M, RADIUS_SHARE * off_m)
 
 
 def _place(
-    line: Line, cut_en: PointEn, area: AreaLike, marks: Marks, course: float, most_m: float, least_m: float
+    line: Line, cut_en: PointEn, area: AreaLike, marks: Sequence[Mark], course: float, most_m: float, least_m: float
 ) -> tuple[PointEn, float]:
     """Return a place off the line, and how far off: as far as there is room for the line's margin, up to ``most_m``.
 
@@ -160,9 +165,9 @@ def _place(
     return wanted, most_m
 
 
-def _spare_m(line: Line, places: Sequence[PointEn], area: AreaLike, marks: Marks) -> NDArray[np.float64]:
+def _spare_m(line: Line, places: Sequence[PointEn], area: AreaLike, marks: Sequence[Mark]) -> NDArray[np.float64]:
     """Return how much farther off each place is than is kept clear of what is solid and of ``marks`` [m]."""
-    off = [[distance_m(place, en) - keep_m - ROOM_M for en, keep_m in marks] for place in places]
+    off = [[distance_m(place, mark.en_m) - mark.keep_m - ROOM_M for mark in marks] for place in places]
     return np.minimum(area.spare_m(places, line.margin_m), [min(row, default=math.inf) for row in off])
 
 
