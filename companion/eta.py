@@ -63,13 +63,17 @@ class ExpectedPlace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaceTrial:
-    """A walk to be held against what comes: to the end of item ``until`` of a plan, in ``winds``, in ``walk_s``."""
+    """A walk to be held against what comes: to the end of item ``until`` of a plan, in ``winds``, in ``walk_s``.
+
+    In the first one after a stop she gathers way (``sets_out``): that tells nothing of the pace that she keeps.
+    """
 
     t_s: float
     plan_id: int
     until: int
     winds: Winds
     walk_s: float
+    sets_out: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +138,7 @@ class Pace:
         ``left_s`` is what is left of the walk that was tried; None: that is not known, or the walk was given up.
         """
         tried, after = self.tried, replace(self, tried=fresh)
-        if tried is None or left_s is None or t_s - tried.t_s > 1.5 * TRIED_S:
+        if tried is None or tried.sets_out or left_s is None or t_s - tried.t_s > 1.5 * TRIED_S:
             return after
         took_s, made_s = t_s - tried.t_s, tried.walk_s - left_s
         return replace(
@@ -249,7 +253,12 @@ def paced(pace: Pace, snapshot: Snapshot, state: SkipperState, voyage: Voyage) -
         None
         if walk is None or walk.last < 0
         else PaceTrial(
-            t_s=snapshot.t_s, plan_id=route.plan_id, until=walk.last, winds=walk.winds, walk_s=walk.points[-1].in_s
+            t_s=snapshot.t_s,
+            plan_id=route.plan_id,
+            until=walk.last,
+            winds=walk.winds,
+            walk_s=walk.points[-1].in_s,
+            sets_out=tried is None or (tried.sets_out and snapshot.t_s - tried.t_s < TRIED_S),
         )
     )
     left = None

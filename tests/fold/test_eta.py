@@ -211,3 +211,17 @@ def test_a_hold_tells_nothing_of_her_pace(demo, is_holding):
     state = replace(state, phase=Phase.HOLDING if is_holding else Phase.STANDARD)
     after = companion_eta.paced(before, step.snapshot, state, step.voyage)
     assert (after.tries, after.share, after.tried) == (before.tries, before.share, None)
+
+
+def test_while_she_gathers_way_nothing_is_learned_of_her_pace(demo):
+    """Seconds after setting sail it was 37 % of the plan's, and 11 minutes were told where four followed."""
+    trials = list(dict.fromkeys(step.pace.tried for step, *_ in told(demo) if step.pace.tried is not None))
+    first = next(n for n, trial in enumerate(trials) if not trial.sets_out)
+    assert first > 0
+    assert trials[first].t_s - trials[0].t_s >= TRIED_S  # plans that came meanwhile among them
+    assert not any(trial.sets_out for trial in trials[first:])
+    begun = PRIOR_PACE.seen(0.0, None, replace(trials[0], t_s=0.0, walk_s=100.0))
+    assert begun.seen(TRIED_S, 95.0, trials[first]).tries == 0.0
+    assert (
+        PRIOR_PACE.seen(0.0, None, replace(trials[0], t_s=0.0, sets_out=False)).seen(TRIED_S, 95.0, None).tries == 1.0
+    )
