@@ -54,6 +54,8 @@ function answered(words) {
 
 /** @param {string} verb */
 async function wanted(verb) {
+  // a plan that waits to be confirmed leaves the buttons free: what was asked for last is what is meant
+  if (dialog.open) await new Promise((resolve) => { dialog.addEventListener("close", resolve, { once: true }); dialog.close(); });
   if (verb === "goal") {
     answered("Click the chart where she should sail to; Esc ends it.");
     pick((en) => {

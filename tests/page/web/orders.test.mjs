@@ -12,7 +12,7 @@ class Thing extends EventTarget {
   get isConnected() { return this === page.dialog || this === page.orders || Boolean(this.parent?.isConnected); }
   find(wanted) { return wanted(this) ? this : this.children.filter((c) => c instanceof Thing).map((c) => c.find(wanted)).find(Boolean); }
   show() { this.open = true; }
-  showModal() { this.open = true; }
+  showModal() { assert.ok(!this.open, "InvalidStateError"); this.open = true; }   // as browsers do
   close() { this.open = false; this.dispatchEvent(new Event("close")); }
   click() { this.dispatchEvent(new Event("click")); }
   focus() {}
@@ -60,4 +60,16 @@ test("a plan that comes after it was cancelled is not shown, nor is it that of t
   await settled();
   assert.deepEqual(charted, [null, null, null]);
   assert.equal(button("Give the order").attributes.disabled, "");
+});
+
+test("what is asked for while a plan waits to be confirmed takes its place", async () => {
+  orders.build(["home", "hold"]);
+  (await home())(plan(100));
+  await settled();
+  page.orders.find((t) => t.attributes["data-verb"] === "hold").click();
+  await settled();
+  assert.equal(charted.pop(), null);   // the way home is no longer on the chart
+  assert.ok(page.dialog.open);
+  assert.ok(page.dialog.find((t) => t.children[0] === "Hold here"));
+  button("Cancel").click();
 });
