@@ -157,6 +157,12 @@ export function marks(low, high, most, steps = [1, 2, 5]) {
   return out;
 }
 
+/** The figures of a low axis: three or so, and never one alone, which is no scale. @param {number} low @param {number} high @param {readonly number[]} steps */
+export function scale(low, high, steps) {
+  const few = marks(low, high, 3, steps);
+  return few.length > 1 ? few : marks(low, high, 5, steps);
+}
+
 /** Times to be marked on an axis: those of the clock that are round in it [s]. @param {number} begin @param {number} end @param {number} most @param {number | null} unix_s of the time 0; null: the voyage's own time is the clock */
 export function minutes(begin, end, most, unix_s) {
   const off = unix_s ?? 0, from = (begin + off) / 60, until = (end + off) / 60;

@@ -1,7 +1,7 @@
 // Histories: direction, strength, speed, clearance; with what was forecast a minute before, and what is forecast now.
 import { picture, svg } from "./dom.js";
 import { bearing, clock, distance, scaled, speed, speedUnit } from "./format.js";
-import { marks, minutes, path, unwrapped, wrap } from "./geometry.js";
+import { minutes, path, scale, unwrapped, wrap } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
 /** @typedef {{name: string, unit: string, values: (number | null)[], low: (number | null)[], high: (number | null)[], ahead: [number, number, number][], other: [number, number][], label: (v: number) => string, now: string, least: number, line: number | null, floor: number | null, steps: number[]}} Strip */
@@ -94,7 +94,7 @@ function draw(strip, top, t, x, now, width, begin) {
   /** @type {SVGElement[]} */
   const out = [svg("rect", { x: LEFT, y: top, width: right - LEFT, height: TALL, class: "frame" })];
   const toUnit = strip.unit === "kn" || strip.unit === "m/s" ? scaled(1) : 1;
-  for (const mark of marks(low * toUnit, high * toUnit, 3, strip.steps)) {
+  for (const mark of scale(low * toUnit, high * toUnit, strip.steps)) {
     const v = mark / toUnit;
     out.push(svg("path", { class: "grid", d: path([[LEFT, y(v)], [right, y(v)]]) }), svg("text", { x: LEFT - 6, y: y(v) + 4, class: "axis end" }, strip.label(v)));
   }

@@ -49,6 +49,12 @@ test("a sector goes clockwise from its first to its last direction", () => {
   assert.match(g.sector(0, 200, 0, 10), / 0 1 1 /);
 });
 
+test("an axis has two figures at least", () => {
+  assert.deepEqual(g.scale(6.5, 14.9, [1, 2, 5]), [8, 10, 12, 14]);   // 10 stood there alone
+  assert.deepEqual(g.scale(0, 4.5, [1, 2, 5]), [0, 2, 4]);
+  for (let low = 0; low < 30; low += 0.7) for (let wide = 1; wide < 300; wide *= 1.1) assert.ok(g.scale(low, low + wide, [1, 2, 5]).length > 1, `${low} ${wide}`);
+});
+
 test("marks are round, within, and not too many", () => {
   for (const [low, high] of [[0, 1], [-3, 17], [340, 385], [4.1, 4.9], [0, 1e-9]]) {
     const marks = g.marks(low, high, 4);
