@@ -31,10 +31,9 @@ export async function packed() {
 export function follow(hears) {
   /** @type {EventSource | null} */
   let source = null;
-  let isOver = false;
   let last = 0;
   const open = () => {
-    if (source !== null || isOver) return;
+    if (source !== null || document.hidden) return;
     source = new EventSource("/api/stream");
     source.addEventListener("open", () => hears.link(true));
     source.addEventListener("error", () => {
@@ -44,7 +43,8 @@ export function follow(hears) {
     });
     source.addEventListener("view", (event) => { last = performance.now(); hears.view(JSON.parse(event.data)); });
     source.addEventListener("log", (event) => hears.log(JSON.parse(event.data)));
-    source.addEventListener("over", () => { isOver = true; source?.close(); source = null; hears.over(); });
+    // the companion has ended: the next voyage's may answer at the same address
+    source.addEventListener("over", () => { source?.close(); source = null; last = 0; hears.over(); setTimeout(open, 5000); });
   };
   document.addEventListener("visibilitychange", () => {
     if (document.hidden) { source?.close(); source = null; } else open();

@@ -46,7 +46,7 @@ function beside() {
 
 function old() {
   const since = page.hello?.kind === "recorded" ? 0 : (performance.now() - page.heard) / 1000;
-  panel.age(page.view, since, page.hello?.kind !== "recorded" && !page.isOver && (!page.isUp || since > 10));
+  panel.age(page.view, since, page.hello?.kind !== "recorded" && (!page.isUp || since > 10), page.isOver);
 }
 
 /** What a view adds to the past; names as in Sample. @param {Past} past @param {View} view */
@@ -96,8 +96,9 @@ async function live() {
     },
     log(event) { log.add([event]); },
     link(isUp) {
-      if (isUp && !page.isUp) isBack = true;
+      if (isUp && (!page.isUp || page.isOver)) isBack = true;
       page.isUp = isUp;
+      if (isUp) page.isOver = false;
       old();
     },
     over() { page.isOver = true; show(); },

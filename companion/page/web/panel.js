@@ -23,16 +23,16 @@ export function show(view, kind, beside = null, area = null) {
   tables(view, beside, area);
 }
 
-/** How old the data are, with what has passed since they came. @param {View | null} view @param {number} since_s @param {boolean} isLost */
-export function age(view, since_s, isLost) {
+/** How old the data are, with what has passed since they came. @param {View | null} view @param {number} since_s @param {boolean} isLost @param {boolean} [isOver] */
+export function age(view, since_s, isLost, isOver = false) {
   const age_s = view && view.age_s !== null ? view.age_s + since_s : null;
-  const isOld = isLost || (age_s !== null && age_s > OLD_S);
+  const isOld = isLost || isOver || (age_s !== null && age_s > OLD_S);
   say("age", age_s === null ? NONE : age_s < 2 ? "now" : `${duration(age_s)} old`);
   document.body.classList.toggle("stale", isOld);
   const strip = get("stale");
   strip.hidden = !isOld;
   if (isOld) {
-    const words = isLost ? `No link to the companion. What is shown is ${age_s === null ? "not" : duration(age_s)} old` : `Data ${duration(age_s)} old: the boat is not heard`;
+    const words = isOver ? `The companion has ended. What is shown is ${age_s === null ? "of before" : `${duration(age_s)} old`}` : isLost ? `No link to the companion. What is shown is ${age_s === null ? "not" : duration(age_s)} old` : `Data ${duration(age_s)} old: the boat is not heard`;
     if (strip.textContent !== words) strip.textContent = words;
   }
 }
@@ -67,7 +67,8 @@ const OFF_PLAN = "The chance that the boat is forced off the plan before the nex
 
 /** @param {string} name @param {string} value @param {string} unit @param {string} [kind] @param {string} [hint] */
 function one(name, value, unit, kind = "", hint = "") {
-  return el("div", hint ? { class: kind, title: hint } : { class: kind }, el("dt", {}, name), el("dd", {}, value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
+  const about = value.startsWith("about ") ? [el("small", {}, "about ")] : [];   // a small word, for the figure has no room beside a large one
+  return el("div", hint ? { class: kind, title: hint } : { class: kind }, el("dt", {}, name), el("dd", {}, ...about, about.length ? value.slice(6) : value, value === NONE || !unit ? "" : el("small", {}, ` ${unit}`)));
 }
 
 /** A clearance; below nought it is how far she is where she must not be. @param {number | null | undefined} metres */
