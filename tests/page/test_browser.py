@@ -334,6 +334,29 @@ def test_live_views_are_shown_the_link_is_lost_and_comes_back_and_old_data_look_
             assert is_own(window, f"http://127.0.0.1:{port}/")
 
 
+SMALL = """
+    const narrow = ([, b]) => b.width && b.height && (b.width < 40 || b.height < 40 || b.right > innerWidth);
+    return [...document.querySelectorAll('button, select')]
+      .map((e) => [e.id || e.textContent, e.getBoundingClientRect()]).filter(narrow).map(([name]) => name)"""
+CUT = "const e = document.getElementById('instruments'); return e.scrollHeight - e.clientHeight"
+
+
+def test_fingers_keys_and_eyes_reach_everything(record):
+    """The mouse alone moved the chart, buttons were 29 px wide, one lay beyond the edge, the battery was cut."""
+    with serving(record) as (url, _), Window(390, 844, phone=True) as window:
+        window.open(url)
+        assert window.js(SMALL) == []
+    with serving(record) as (url, _), Window() as window:
+        window.open(url)
+        window.js("companion.timeline.go(companion.timeline.index(80))")
+        window.until("return companion.view.t_s > 75")
+        assert window.js(CUT) <= 1
+        middle = "return import('/map.js').then((map) => map.middle().en[0])"
+        before = window.js(middle)
+        window.js("dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', shiftKey: true}))")
+        assert window.js(middle) > before
+
+
 def test_a_link_that_breaks_is_said_and_healed_without_a_reload(sailed):
     port = free_port()
     moments = [m for m in sailed.moments if m[0].state.is_sailing]

@@ -170,6 +170,10 @@ const KEYS = [
   ["[", "to the decision before", () => page.timeline?.jump(-1)], ["]", "to the next decision", () => page.timeline?.jump(1)], ["?", "these keys", () => help()],
 ];
 
+const TIMELINE = new Set([" ", "ArrowLeft", "ArrowRight", "[", "]"]);
+/** @type {Record<string, [number, number]>} px */
+const PAN = { ArrowLeft: [-80, 0], ArrowRight: [80, 0], ArrowUp: [0, -80], ArrowDown: [0, 80] };
+
 /** @param {KeyboardEvent} event */
 function keys(event) {
   if (event.key === "Escape") return orders.cancel();
@@ -177,6 +181,9 @@ function keys(event) {
   const target = event.target;
   if (target instanceof HTMLInputElement || target instanceof HTMLSelectElement) return;
   if (event.key === " " && target instanceof HTMLButtonElement) return;
+  const way = event.shiftKey ? PAN[event.key] : undefined;
+  if (way) { event.preventDefault(); return map.pan(...way); }
+  if (page.timeline === null && TIMELINE.has(event.key)) return;   // live they are the browser's: Space and arrows move the page
   const found = KEYS.find(([key]) => key === event.key);
   if (found) { event.preventDefault(); found[2](); }
 }
@@ -194,7 +201,8 @@ function help() {
   close.addEventListener("click", () => dialog.close());
   const names = /** @type {Record<string, string>} */ ({ " ": "space", ArrowLeft: "←", ArrowRight: "→" });
   dialog.replaceChildren(el("h2", { id: "dialogtitle" }, "Keys and signs"),
-    el("dl", { class: "keys" }, ...KEYS.map(([key, words]) => el("div", {}, el("dt", {}, el("kbd", {}, names[key] ?? key)), el("dd", {}, words)))),
+    el("dl", { class: "keys" }, ...KEYS.map(([key, words]) => el("div", {}, el("dt", {}, el("kbd", {}, names[key] ?? key)), el("dd", {}, words))),
+      el("div", {}, el("dt", {}, el("kbd", {}, "⇧ ←")), el("dd", {}, "move the chart: Shift and an arrow"))),
     el("p", {}, "T is the true wind, A the apparent, ◆ the course over ground, ● the mark. P and S are port and starboard tack: the side that the wind comes over. The wedges are the no-go zone now, in a minute and in five; a layline's fan holds 80 % of the forecast."), close);
   if (!dialog.open) dialog.showModal();
 }

@@ -97,6 +97,12 @@ export function follow(follow) {
   draw();
 }
 
+/** Move what is seen. @param {number} right px @param {number} down px */
+export function pan(right, down) {
+  camera.centre = unproject(camera, [camera.width / 2 + right, camera.height / 2 + down]);
+  follow(false);
+}
+
 export function isFollowing() {
   return state.follow;
 }
