@@ -18,8 +18,6 @@ from dataclasses import replace
 import numpy as np
 
 from bench.winds import simulate_entries
-from companion.geo.frame import LocalFrame
-from companion.messages import GeoPoint
 from companion.planner import Problem, plan
 from companion.planner.problem import BoatLimits, ProblemWind, RiskLimit, Sigma, evaluate
 from companion.planner.risk import path_risk
@@ -30,7 +28,6 @@ from companion.traffic.vessel import hull_of
 
 HORIZON_S = 450.0
 FUTURES = 6000
-FRAME = LocalFrame(GeoPoint(lat_deg=51.1, lon_deg=-1.3))
 LEAST_PROMISE = 0.01
 SHOWN_RATIO = 0.002  # below it 6,000 futures do not tell a third from nothing
 

@@ -53,7 +53,7 @@ _EARTH_M = 6_371_000.0
 _STEERED_MPS = 11.0  # to the east, so fast travel waves of the weather
 _AT_ONCE_MPS, _GROWN_MPS, _GROWN_S = 0.5, 4.0, 10 * 86_400.0
 _TROPIC_SHARE = 0.4  # of an error, in the trades
-_DAY_S, _YEAR_S = 86_400.0, 365.2422 * 86_400.0
+_YEAR_S = 365.2422 * 86_400.0
 
 
 class _Waves:
@@ -131,11 +131,9 @@ def forecast(seed: int, utc_s: Floats, box: Box, *, members: int = 1, run: int =
     return _told(_true(seed, utc_s, lat, lon), seed, utc_s, lat, lon, members, run)
 
 
-def forecast_of(
-    true: Weather, seed: int, utc_s: Floats, box: Box, *, members: int = 1, run: int = 0, step_deg: float = 1.0
-) -> Weather:
+def forecast_of(true: Weather, seed: int, utc_s: Floats, box: Box, *, members: int = 1, run: int = 0) -> Weather:
     """Return what ``forecast`` does of a wind that is known, as a reanalysis or ``truth`` itself: its first member."""
-    lat, lon = grid_of(box, step_deg)
+    lat, lon = grid_of(box, 1.0)
     rows, columns = (part.ravel() for part in np.meshgrid(lat, lon, indexing="ij"))
     blows = true.wind_over(utc_s, rows, columns)[0].astype(np.float64)
     return _told(blows.reshape(utc_s.size, lat.size, lon.size, 2), seed, utc_s, lat, lon, members, run)

@@ -244,7 +244,7 @@ class Steps:
         return len(self.twd_rad) // PARTS
 
 
-def steps_of(race: Race, step_s: float, until_s: float, angle_rad: float = ANGLE_RAD) -> Steps:
+def steps_of(race: Race, step_s: float, until_s: float) -> Steps:
     """Return the steps until ``until_s``, and those of a board that begins then."""
     craft = race.craft
     board = max(1, math.ceil(craft.tack_s / step_s), math.floor(craft.board_s / step_s + 1e-9))
@@ -252,7 +252,7 @@ def steps_of(race: Race, step_s: float, until_s: float, angle_rad: float = ANGLE
     twd, tws = race.weather.at((np.arange(count * PARTS) + 0.5) * step_s / PARTS)
     low, high = craft.no_go_half_rad, craft.max_twa_rad
     best = craft.polar.best_beat(float(np.mean(tws)), no_go_half_rad=low).twa_rad
-    angles = np.unique([*np.linspace(low, high, max(2, 1 + math.ceil((high - low) / angle_rad - 1e-9))), best])
+    angles = np.unique([*np.linspace(low, high, max(2, 1 + math.ceil((high - low) / ANGLE_RAD - 1e-9))), best])
     speeds = np.stack([craft.polar.speeds_mps(angles, float(w)) for w in tws])
     return Steps(step_s=step_s, angle_rad=angles, twd_rad=twd, speed_mps=speeds, tack_s=craft.tack_s, board=board)
 

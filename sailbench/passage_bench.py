@@ -23,7 +23,6 @@ from sailbench.plan_bench import processor_s
 
 # A passage and its departure [Unix s] go in, latitudes and longitudes from the start come out; None: no way was found.
 Router = Callable[[Passage, float], Sequence[tuple[float, float]] | None]
-SLOWER = 0.005  # what is called slower: the integrator's own error is a tenth of it
 _EVERY_M = 1000.0  # land is looked for so often
 _NEAR_M = 3.0 * RADIUS_M  # a route that ends farther from the goal is led there straight
 

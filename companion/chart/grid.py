@@ -21,7 +21,6 @@ _FILLED = (99.0, 999.0, 9999.0)  # what programs write for nothing, perhaps with
 _ALIKE = 0.1  # a height that is one has others within so much of it
 BAND_M = 0.5  # of water that dries: a piece of it is no farther from its own least depth ...
 MOST_BANDS = 6  # ... but where the tide is great: each band takes discs of a plan
-COARSE_M = 100.0  # from here on a harbour is a cell or two
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from companion.messages import Spread, Target
-from companion.traffic.approach import OwnShip
 from companion.traffic.predict import TURN_HOLD_S, MotionUncertainty, Prediction, motion_of, predict, turn_rate
 from companion.traffic.vessel import STILL_MPS, Vessel
 
@@ -178,15 +177,3 @@ def _disc(
         mmsi=vessel.mmsi,
         spread=spread,
     )
-
-
-def too_near(discs: Sequence[Target], own: OwnShip) -> tuple[Target, ...]:
-    """Return the discs that our boat is already in: no plan can start, steer by field (or by hand) first."""
-    out = []
-    for disc in discs:
-        if disc.from_s > 0.0:
-            continue
-        x, y = disc.centre_en_m(0.0)
-        if math.hypot(own.en_m[0] - x, own.en_m[1] - y) < disc.radius_at_m(0.0):
-            out.append(disc)
-    return tuple(out)

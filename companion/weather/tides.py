@@ -29,7 +29,6 @@ LONG_STEP_S = 3600.0  # beyond LONG_S: 3 %
 LONG_S = 5.0 * 86_400.0
 _CHUNK = 1024  # places at a time
 _KEPT = 8  # sets of places whose weights are kept: a grid is asked for each time again
-MOST_M, MOST_MPS = 20.0, 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,7 +42,6 @@ class Tides:
         constants: (s, c, k) ``A exp(-i g)``, NaN where unknown; k is 1 of a height and 2 of a stream.
         mean: (s, k): Z0.
         reach_m: a station says nothing of what is farther away; of a grid 0.
-        titles: (s,) names of stations.
     """
 
     what: str
@@ -55,7 +53,6 @@ class Tides:
     source: str
     reach_m: float = 0.0
     shape: tuple[int, int] | None = None
-    titles: tuple[str, ...] = ()
     _kept: dict[bytes, tuple[NDArray[np.int64], Floats]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -249,7 +246,6 @@ def _of_stations(what: str, found: Sequence[tuple[_Station, Sequence[_Part]]], r
         mean=mean,
         source=source,
         reach_m=1000.0 * reach_km,
-        titles=tuple(s.name for s, _ in found),
     )
 
 

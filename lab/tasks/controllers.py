@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from companion.geo.angles import wrap_pi
 
 RUDDER_MAX_RAD = math.pi / 4.0
+GAMMA_RAD = math.pi / 4.0  # at which the line is approached from far off; half of it at ``r_m``
+SAIL_ABEAM_RAD = math.pi / 4.0  # beta of line 9: the sail's angle in a wind abeam
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,15 +41,12 @@ def line_following(
     q: int,
     *,
     r_m: float = 50.0,
-    gamma_rad: float = math.pi / 4.0,
     close_hauled_rad: float = math.pi / 4.0,
-    sail_abeam_rad: float = math.pi / 4.0,
 ) -> LineCommand:
     """Return rudder and sheet that bring the boat to the line from a to b and along it [1].
 
     In [1] angles are counted anticlockwise from x and the wind's is where it blows to; here they are headings and
-    where it comes from, which turns signs but not the law. ``sail_abeam_rad`` is beta of line 9, the sail's angle
-    in a wind abeam.
+    where it comes from, which turns signs but not the law.
     """
     de, dn = b_en[0] - a_en[0], b_en[1] - a_en[1]
     length = math.hypot(de, dn)
@@ -56,7 +55,7 @@ def line_following(
     offset = (de * (at_en[1] - a_en[1]) - dn * (at_en[0] - a_en[0])) / length if length > 0.0 else 0.0
     if abs(offset) > 0.5 * r_m:  # line 2
         q = 1 if offset > 0.0 else -1
-    nominal = course + (2.0 * gamma_rad / math.pi) * math.atan(offset / r_m)  # lines 3, 4
+    nominal = course + (2.0 * GAMMA_RAD / math.pi) * math.atan(offset / r_m)  # lines 3, 4
     limit = math.cos(close_hauled_rad)
     unsailable = math.cos(nominal - twd_from_rad) > limit  # line 5
     beating = abs(offset) < r_m and math.cos(course - twd_from_rad) > limit
@@ -64,24 +63,24 @@ def line_following(
     return LineCommand(
         heading_rad=wrap_pi(wanted),
         rudder_rad=rudder_for(heading_rad, wanted),
-        sail_max_rad=sail_for(wanted, twd_from_rad, sail_abeam_rad),
+        sail_max_rad=sail_for(wanted, twd_from_rad),
         q=q,
         offset_m=offset,
     )
 
 
-def rudder_for(heading_rad: float, wanted_rad: float, rudder_max_rad: float = RUDDER_MAX_RAD) -> float:
+def rudder_for(heading_rad: float, wanted_rad: float) -> float:
     """Return the rudder [rad], positive to starboard: as the sine, hard over beyond 90 degrees (line 8)."""
     off = wanted_rad - heading_rad
     if math.cos(off) >= 0.0:
-        return rudder_max_rad * math.sin(off)
-    return math.copysign(rudder_max_rad, math.sin(off))
+        return RUDDER_MAX_RAD * math.sin(off)
+    return math.copysign(RUDDER_MAX_RAD, math.sin(off))
 
 
-def sail_for(wanted_rad: float, twd_from_rad: float, sail_abeam_rad: float = math.pi / 4.0) -> float:
+def sail_for(wanted_rad: float, twd_from_rad: float) -> float:
     """Return the sail's largest angle [rad] for a heading (line 9): 0 into the wind, beta abeam, π/2 before it."""
     down = 0.5 * (1.0 - math.cos(wanted_rad - twd_from_rad))
-    return 0.5 * math.pi * math.pow(down, math.log(0.5 * math.pi / sail_abeam_rad) / math.log(2.0))
+    return 0.5 * math.pi * math.pow(down, math.log(0.5 * math.pi / SAIL_ABEAM_RAD) / math.log(2.0))
 
 
 def motor_commands(rudder_rad: float) -> tuple[float, float]:

@@ -248,8 +248,11 @@ def run_wrsc(seed: int, autopilot: str = "embedded", speedup: float = 8.0) -> Wr
     return score(rows, np.column_stack(course.at(rows[:, 0])), seed=seed)
 
 
+STATION_RADIUS_M = 20.0
+
+
 def run_station(
-    seed: int, autopilot: str = "embedded", speedup: float = 8.0, radius_m: float = 20.0, method: str = "field"
+    seed: int, autopilot: str = "embedded", speedup: float = 8.0, method: str = "field"
 ) -> dict[str, float]:
     """Keep station over MAVLink for five minutes after the first point inside, and score it.
 
@@ -273,7 +276,7 @@ def run_station(
 
         def over(t_s: float) -> bool:
             now = truth()
-            if not inside and math.dist((now.east_m, now.north_m), point) < radius_m:
+            if not inside and math.dist((now.east_m, now.north_m), point) < STATION_RADIUS_M:
                 inside.append(t_s)
             return bool(inside) and t_s > inside[0] + 301.0
 
@@ -288,7 +291,7 @@ def run_station(
         return await _sail_mission(facade, truth, items, over, 900.0)
 
     rows = np.asarray(with_boat(wind, seed, twd + math.pi / 2.0, job, autopilot, speedup))
-    result = station_score(rows, point, radius_m=radius_m, length_m=1.0)
+    result = station_score(rows, point, radius_m=STATION_RADIUS_M, length_m=1.0)
     return {"seed": seed, "tws_mps": round(tws, 1), **asdict(result)}
 
 

@@ -165,12 +165,7 @@ WIND_SIGMA = Sigma(model="ar1", sigma0_rad=math.radians(3.0), sigma_inf_rad=math
 
 
 def problem_for(
-    seen: Situation,
-    habits: GuidanceSettings,
-    goal_en: tuple[float, float],
-    discs: tuple[Target, ...],
-    *,
-    goal_radius_m: float = GOAL_RADIUS_M,
+    seen: Situation, habits: GuidanceSettings, goal_en: tuple[float, float], discs: tuple[Target, ...]
 ) -> Problem:
     """Return the planning problem of the moment; its clock starts now, as the discs' does."""
     assert seen.twd_from_rad is not None
@@ -178,7 +173,7 @@ def problem_for(
         start_en=seen.en_m,
         start_heading_rad=seen.heading_rad,
         goal_en=goal_en,
-        goal_radius_m=goal_radius_m,
+        goal_radius_m=GOAL_RADIUS_M,
         wind=ProblemWind(twd_from_rad=seen.twd_from_rad, tws_mps=seen.tws_mps, sigma=WIND_SIGMA),
         boat=BoatLimits(
             no_go_half_rad=habits.no_go_half_rad,

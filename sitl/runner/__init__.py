@@ -1,6 +1,6 @@
 """The runner: seeded jobs over processes or a Dask cluster, and the file in which each result stays as it comes."""
 
-from sitl.runner.executors import WorkerDiedError, in_processes, settled
+from sitl.runner.executors import WorkerDiedError, settled
 from sitl.runner.experiment import CampaignResults, Experiment, ExperimentSummary, sail_kept
 from sitl.runner.job import SCENARIO_FOLDER, Job, ScenarioBundle, file_hash
 from sitl.runner.result_store import (
@@ -30,7 +30,6 @@ __all__ = [
     "Table",
     "WorkerDiedError",
     "file_hash",
-    "in_processes",
     "joined",
     "made_by",
     "read_results",

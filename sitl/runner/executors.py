@@ -46,17 +46,6 @@ def cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def in_processes(work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers: int | None) -> Iterator[ResultT]:
-    """Yield ``work`` of each job as it is done, by ``workers`` processes (None: one per core; 1: here, in order).
-
-    What a job raises is raised. A process that dies is replaced, and its job done again once.
-    """
-    for _, result in settled(work, jobs, workers):
-        if isinstance(result, Exception):
-            raise result
-        yield result
-
-
 def settled(
     work: Callable[[JobT], ResultT], jobs: Iterable[JobT], workers: int | None
 ) -> Generator[tuple[int, ResultT | Exception], None, None]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.traffic import LAKE, SEA, Alarm, cpa, predict
 from companion.traffic.approach import alarm_of
-from companion.traffic.occupancy import Keep, needed_radius_m, planning_discs, too_near
+from companion.traffic.occupancy import Keep, needed_radius_m, planning_discs
 from companion.traffic.predict import motion_of, risk_factor
 from tests.traffic.conftest import own, vessel
 
@@ -71,8 +71,8 @@ def test_on_top_of_us_is_a_touch_not_a_crash() -> None:
     a = cpa(own(), vessel((0.0, 0.0), None, None), 0.0)
     assert alarm_of(a, LAKE) is Alarm.TOUCH
     assert a.distance_m == 0.0
-    discs = planning_discs([vessel((0.0, 0.0), None, None)], 0.0)
-    assert too_near(discs, own())
+    (disc, *_) = planning_discs([vessel((0.0, 0.0), None, None)], 0.0)
+    assert math.dist(own().en_m, disc.centre_en_m(0.0)) < disc.radius_at_m(0.0)
 
 
 angle = st.floats(0.0, 359.0)

@@ -226,20 +226,23 @@ def polar_path(boat: BoatOptions, source: Path) -> Path | None:
     return None
 
 
-def load_mission(path: str | Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
-    """Read and check a mission TOML with the files that it names; what is ``given`` of a file stands for its content.
+def load_mission(path: str | Path) -> Mission:
+    """Read and check a mission TOML with the files that it names.
 
     Raises InputError (one line: file, place, problem, remedy) for anything that the boat must not sail with:
     unknown keys, values out of range, missing, broken or empty geometry, swapped axes, a start or goal outside
     free water.
     """
-    mission = read_mission(Path(path), given)
+    mission = read_mission(Path(path))
     check_places(mission)
     return mission
 
 
 def read_mission(path: Path, given: Mapping[Path, bytes] = AS_IT_IS) -> Mission:
-    """Read a mission as ``load_mission`` does, without a look at whether its places lie in free water."""
+    """Read a mission as ``load_mission`` does, without a look at whether its places lie in free water.
+
+    What is ``given`` of a file stands for its content.
+    """
     options = _options_of(path, given)
     if options.from_autopilot and not options.goal:
         raise InputError(
@@ -311,7 +314,7 @@ def assembled(
 ) -> Mission:
     """Return the mission of ``options`` with the files that they name, which lie relative to ``path``.
 
-    The zones of ``drawn`` belong to its area; ``given`` is as for ``load_mission``, of its area's files. Whether its
+    The zones of ``drawn`` belong to its area; ``given`` is as for ``read_mission``, of its area's files. Whether its
     places lie in free water is not looked at. Raises InputError.
     """
     reader = GoalReader(path=path, axis=options.area.axis)

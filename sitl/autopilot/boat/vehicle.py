@@ -464,6 +464,3 @@ class Vehicle:
 def _unit(east: float, north: float) -> tuple[float, float]:
     length = math.hypot(east, north)
     return (east / length, north / length) if length > 1e-9 else (0.0, 1.0)
-
-
-Floats = NDArray[np.float64]
