@@ -22,7 +22,7 @@ from companion.skipper.priorities import BEHAVIORS
 from companion.view.area import AreaView
 from companion.view.events import Event
 from companion.view.passage import PassageView
-from companion.view.values import Past, View
+from companion.view.values import SCHEMA, Past, View
 from sitl.scenario import scenario
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -304,8 +304,8 @@ def schema() -> dict[str, Any]:
                 part.pop("default", None)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "companion.view/1",
-        "title": "companion.view/1",
+        "$id": SCHEMA,
+        "title": SCHEMA,
         "$ref": "#/$defs/View",
         "$defs": dict(sorted(components.items())),
     }
