@@ -329,7 +329,7 @@ MUTATIONS = (
     ),
     Mutation(
         "lab/tasks/controllers.py",
-        "return rudder_max_rad * math.sin(off)",
+        "return RUDDER_MAX_RAD * math.sin(off)",
         "return -math.sin(off)",
         "tests/lab/test_controllers.py::test_rudder_and_sheet",
     ),
