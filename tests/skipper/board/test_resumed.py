@@ -118,3 +118,10 @@ def test_half_way_round_a_buoy_she_goes_on_round_it_only_where_it_leads_on_to_th
 def test_a_state_that_says_nothing_of_its_goals_is_taken_as_it_is():
     before = replace(saved(A, B, C, gate=1), goals=())
     assert resumed(skipper(X, N).voyage, before) == (before, "")
+
+
+def test_a_stay_at_the_last_goal_is_not_counted_on_at_another_one():
+    before = replace(saved(A, B, gate=2), station_utc_s=77.0)
+    assert resumed(skipper(A, B).voyage, before)[0].station_utc_s == 77.0
+    assert resumed(skipper(A, C).voyage, before)[0].station_utc_s is None
+    assert resumed(skipper(A, B, C).voyage, before)[0].station_utc_s is None
