@@ -234,6 +234,12 @@ def test_a_way_is_cut_where_it_leads_into_what_is_taken(way, is_cut):
     assert drawn.cuts(way) is is_cut
 
 
+def test_how_far_a_place_is_from_what_is_taken_counts_to_its_very_edge():
+    taken = shapely.box(0.0, 0.0, 100.0, 50.0)
+    drawn = Drawn(taken=taken, left=area(**BAY))
+    assert [drawn.inside_m((x, 25.0)) for x in (-0.5, -3.0, 0.5, 3.0)] == pytest.approx([0.5, 3.0, -0.5, -3.0])
+
+
 def test_she_does_not_set_sail_for_a_goal_outside_of_what_is_drawn():
     world = fenced(NEAR, FAR, extra={"fence": (square(IN, -300, -300, 300, 200),)})
     world.run(90)
