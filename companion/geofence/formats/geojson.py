@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from companion.geofence.charted import MEMBER, Charted
 from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.losses import Losses, Written, leave_out
 from companion.geofence.formats.rings import on_globe, polygons_from_rings
-from companion.geofence.formats.routes import Reading, RoutePoint, items_of, pins_as_dangers, pins_as_route
+from companion.geofence.formats.routes import Reading, pins_as_dangers
 from companion.geofence.formats.untrusted import MAX_DEPTH, MAX_POSITIONS, JsonNode, parse_json
 from companion.geofence.shapes import MOST_RADIUS_M, Circle, Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
@@ -45,8 +46,6 @@ class _GeoJsonReading(Reading):
         super().__init__(source, kind, areas=areas)
         self.items: list[MissionItem] = []
         self.item_names: list[str] = []
-        self.home: GeoPoint | None = None
-        self.return_point: GeoPoint | None = None
         self.positions = 0
 
     def feature(self, node: JsonNode) -> None:
@@ -159,9 +158,9 @@ class _GeoJsonReading(Reading):
         role = role_node.text() if role_node is not None else ""
         radius = properties.get("radius_m")
         if role == "home":
-            self.home = point
+            self.places["home"] = point
         elif role == "return":
-            self.return_point = point
+            self.places["return"] = point
         elif role in {"waypoint", "rally"}:
             item = _item(point, properties, rally=role == "rally")
             if role == "rally":
@@ -263,30 +262,17 @@ def read_geojson(text: str, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION,
         reading.feature(root)
     else:
         reading.geometry(root, JsonNode({}, source), "")
-    route: list[RoutePoint] = []
-    places: dict[str, GeoPoint] = {"home": reading.home} if reading.home is not None else {}
     has_line = bool(reading.tracks) or any(isinstance(m.geometry, LineString) for m in reading.marks)
     if reading.items or has_line:
         reading.marks.extend(pins_as_dangers(reading.pins, kind, reading.findings))
     else:
-        pins_as_route(reading.pins, route, places, reading.findings)
-    pins, pin_names = items_of(route)
-    items = tuple(reading.items) or pins
-    names = (tuple(reading.item_names) if any(reading.item_names) else ()) or pin_names
-    document = Document(
-        source=source,
-        format="geojson",
-        zones=tuple(reading.zones),
-        marks=tuple(reading.marks),
-        items=items,
-        item_names=names,
-        home=places.get("home"),
-        rally=tuple(reading.rally),
-        return_point=reading.return_point,
-        tracks=tuple(reading.tracks),
-        findings=tuple(reading.findings),
-        charted=None if made_for is None else _charted(made_for),
-    )
+        reading.pins_as_route()
+    document = reading.document("geojson")
+    if reading.items:
+        names = tuple(reading.item_names) if any(reading.item_names) else ()
+        document = replace(document, items=tuple(reading.items), item_names=names)
+    if made_for is not None:
+        document = replace(document, charted=_charted(made_for))
     if document.is_empty and not reading.findings:
         reading.findings.add(
             FindingLevel.ERROR, Code.EMPTY, "", "holds no feature", "an empty file is not 'no obstacles'"

@@ -20,7 +20,7 @@ from companion.errors import InputError
 from companion.geofence.document import Code, Document, FindingLevel, Mark, Track
 from companion.geofence.formats.fence_items import ring_of
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out, without_holes
-from companion.geofence.formats.routes import Reading, RoutePoint, items_of, line_as_area, pins_as_route, route_of
+from companion.geofence.formats.routes import Reading, line_as_area, route_of
 from companion.geofence.formats.untrusted import MAX_POSITIONS, parse_xml, printable
 from companion.geofence.shapes import Zone, ZoneKind, wrap_lon_deg
 from companion.messages import Command, GeoPoint, MissionItem
@@ -31,11 +31,6 @@ _MISSION, _TRACK = "mission", "track"
 
 
 class _GpxReading(Reading):
-    def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
-        super().__init__(source, kind, areas=areas)
-        self.route: list[RoutePoint] = []
-        self.places: dict[str, GeoPoint] = {}
-
     def point(self, node: Any, place: str) -> GeoPoint:
         lat_deg, lon_deg = node.latitude, node.longitude
         if lat_deg is None or lon_deg is None or not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
@@ -81,21 +76,8 @@ def read_gpx(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
                 FindingLevel.NOTE, Code.DROPPED, "", f"the waypoint {name} is no part of a route and is not used"
             )
     else:
-        pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
-    items, names = items_of(reading.route)
-    document = Document(
-        source=source,
-        format="gpx",
-        zones=tuple(reading.zones),
-        marks=tuple(reading.marks),
-        items=items,
-        item_names=names,
-        home=reading.places.get("home"),
-        return_point=reading.places.get("return"),
-        rally=tuple(reading.rally),
-        tracks=tuple(reading.tracks),
-        findings=tuple(reading.findings),
-    )
+        reading.pins_as_route()
+    document = reading.document("gpx")
     if document.is_empty and not reading.findings:
         reading.findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no route, track or waypoint")
         return Document(source=source, format="gpx", findings=tuple(reading.findings))

@@ -20,15 +20,7 @@ from companion.geofence.document import Code, Document, FindingLevel, Mark, Trac
 from companion.geofence.formats.losses import Losses, Written, as_polygon, leave_out
 from companion.geofence.formats.mission_planner import decimal
 from companion.geofence.formats.rings import on_globe, polygons_from_rings
-from companion.geofence.formats.routes import (
-    Reading,
-    RoutePoint,
-    items_of,
-    pins_as_dangers,
-    pins_as_route,
-    route_of,
-    track_points,
-)
+from companion.geofence.formats.routes import Reading, pins_as_dangers, route_of, track_points
 from companion.geofence.formats.untrusted import (
     MAX_BYTES,
     MAX_POSITIONS,
@@ -39,7 +31,7 @@ from companion.geofence.formats.untrusted import (
     printable,
 )
 from companion.geofence.shapes import Zone, ZoneKind, unwrapped, wrap_lon_deg
-from companion.messages import Command, GeoPoint, MissionItem
+from companion.messages import Command, MissionItem
 
 _KINDS = {k.value: k for k in ZoneKind}
 _SHAPES = {"Polygon", "LineString", "LinearRing", "Point"}
@@ -65,8 +57,6 @@ def unzip_kmz(data: bytes, source: str) -> bytes:
 class _KmlReading(Reading):
     def __init__(self, source: str, kind: ZoneKind, *, areas: bool) -> None:
         super().__init__(source, kind, areas=areas)
-        self.route: list[RoutePoint] = []
-        self.places: dict[str, GeoPoint] = {}
         self.positions = 0
 
     def coordinates(self, element: Any, place: str) -> list[tuple[float, float, float]]:
@@ -118,21 +108,8 @@ def read_kml(data: bytes, source: str, *, kind: ZoneKind = ZoneKind.EXCLUSION, a
     if reading.route or has_line:
         reading.marks.extend(pins_as_dangers(reading.pins, kind, reading.findings))
     else:
-        pins_as_route(reading.pins, reading.route, reading.places, reading.findings)
-    items, names = items_of(reading.route)
-    document = Document(
-        source=source,
-        format="kml",
-        zones=tuple(reading.zones),
-        marks=tuple(reading.marks),
-        items=items,
-        item_names=names,
-        home=reading.places.get("home"),
-        return_point=reading.places.get("return"),
-        rally=tuple(reading.rally),
-        tracks=tuple(reading.tracks),
-        findings=tuple(reading.findings),
-    )
+        reading.pins_as_route()
+    document = reading.document("kml")
     if document.is_empty and not any(f.severity is FindingLevel.ERROR for f in reading.findings):
         reading.findings.add(FindingLevel.ERROR, Code.EMPTY, "", "holds no placemark with a shape")
         return Document(source=source, format="kml", findings=tuple(reading.findings))

@@ -28,6 +28,41 @@ class Reading:
         self.tracks: list[Track] = []
         self.rally: list[MissionItem] = []
         self.pins: list[RoutePoint] = []
+        self.route: list[RoutePoint] = []
+        self.places: dict[str, GeoPoint] = {}  # by role: home, return
+
+    def pins_as_route(self) -> None:
+        """Make pins that say nothing of themselves the route of a file without a line; one called start is its home."""
+        for pin in self.pins:
+            if pin[2].strip().lower() in _START_NAMES and "home" not in self.places:
+                self.places["home"] = pin[0]
+            else:
+                self.route.append(pin)
+        if self.route:
+            start = ", the one called start for the start" if len(self.route) < len(self.pins) else ""
+            self.findings.add(
+                FindingLevel.NOTE,
+                Code.FORMAT,
+                "",
+                f"{counted(len(self.route), 'pin')} taken for places to sail to, in the file's order{start}",
+            )
+
+    def document(self, form: str) -> Document:
+        """Return what was read of a file of the format ``form``; its route is the mission."""
+        items, names = items_of(self.route)
+        return Document(
+            source=self.source,
+            format=form,
+            zones=tuple(self.zones),
+            marks=tuple(self.marks),
+            items=items,
+            item_names=names,
+            home=self.places.get("home"),
+            return_point=self.places.get("return"),
+            rally=tuple(self.rally),
+            tracks=tuple(self.tracks),
+            findings=tuple(self.findings),
+        )
 
 
 _START_NAMES = {"start", "home"}
@@ -66,28 +101,6 @@ def items_of(points: Iterable[RoutePoint]) -> tuple[tuple[MissionItem, ...], tup
         )
         names.append(name)
     return tuple(items), tuple(names) if any(names) else ()
-
-
-def pins_as_route(
-    pins: Sequence[RoutePoint], route: list[RoutePoint], places: dict[str, GeoPoint], findings: Findings
-) -> None:
-    """Make pins that say nothing of themselves the route of a file that has no line; one called start is its home.
-
-    ``route`` and ``places`` are filled.
-    """
-    for pin in pins:
-        if pin[2].strip().lower() in _START_NAMES and "home" not in places:
-            places["home"] = pin[0]
-        else:
-            route.append(pin)
-    if route:
-        start = ", the one called start for the start" if len(route) < len(pins) else ""
-        findings.add(
-            FindingLevel.NOTE,
-            Code.FORMAT,
-            "",
-            f"{counted(len(route), 'pin')} taken for places to sail to, in the file's order{start}",
-        )
 
 
 def pins_as_dangers(pins: Sequence[RoutePoint], kind: ZoneKind, findings: Findings) -> list[Mark]:
