@@ -104,7 +104,8 @@ class BoatLimits:
     how far all its speeds may be off together: the standard deviation of the logarithm; ``speed_share`` what it is
     seen to make of them, and ``shape_error`` how far each may be off beside that, at the angles of
     ``SHAPE_TWA_RAD``. All of it moves when it arrives, not what it is planned to do. ``leeway_rad`` is how much of
-    ``no_go_half_rad`` is leeway, for words: angles here are of courses.
+    ``no_go_half_rad`` is leeway and current down the wind, which a track cannot tell apart; for words: angles here are
+    of courses.
     """
 
     no_go_half_rad: float
