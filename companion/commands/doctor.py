@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from companion.errors import InputError
-from companion.program.arguments import number, system_id
+from companion.program.arguments import autopilot_options, number
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -68,15 +68,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         description="Read the autopilot's parameters, version, streams, fence and mission; say what would spoil a "
         "voyage and what to set.",
     )
-    parser.add_argument(
-        "--link", metavar="LINK", help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
-    )
-    parser.add_argument(
-        "--system",
-        type=system_id,
-        metavar="N",
-        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
-    )
+    autopilot_options(parser, required=False)
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="hold the settings against this voyage")
     parser.add_argument(
         "--log",

@@ -18,7 +18,7 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, number, picture, place, system_id
+from companion.program.arguments import add_command, number, picture, place, radio_option, system_option
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -101,15 +101,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def link_options(parser: argparse.ArgumentParser) -> None:
     """Add --link, --system and --timeout."""
-    parser.add_argument(
-        "--link",
-        required=True,
-        metavar="LINK",
-        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
-    )
-    parser.add_argument(
-        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
-    )
+    radio_option(parser)
+    system_option(parser)
     parser.add_argument(
         "--timeout", type=number("s", above=0.0), default=10.0, metavar="S", help="wait this long for a heartbeat (10)"
     )

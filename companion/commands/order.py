@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
 from companion.orders import TABLE, phrase
-from companion.program.arguments import number, system_id
+from companion.program.arguments import number, radio_option, system_option
 
 if TYPE_CHECKING:
     from companion.orders import Answer, Wanted
@@ -54,13 +54,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("words", nargs="*", metavar="VERB [ARGS]", help="the order, see below")
-    parser.add_argument(
-        "--link", metavar="LINK", help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
-    )
+    radio_option(parser, required=False)
     parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
-    parser.add_argument(
-        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
-    )
+    system_option(parser)
     parser.add_argument(
         "--timeout",
         type=number("s", above=0.0),

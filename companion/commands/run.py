@@ -18,7 +18,15 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from companion.errors import CompanionError, InputError
 from companion.guard import Auxiliary
-from companion.program.arguments import chart_option, host_name, http_address, number, out_folder, system_id, whole
+from companion.program.arguments import (
+    autopilot_options,
+    chart_option,
+    host_names_option,
+    http_address,
+    number,
+    out_folder,
+    whole,
+)
 from companion.program.commands import missing
 from companion.words import counted, file_name, goals_reached
 
@@ -77,18 +85,7 @@ def _add_mission(parser: argparse.ArgumentParser) -> None:
         help="sail what was drawn in a ground station and uploaded: waypoints are goals, the fence is "
         "the area, rally points are refuges (in the file: from_autopilot = true)",
     )
-    parser.add_argument(
-        "--link",
-        required=True,
-        metavar="LINK",
-        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
-    )
-    parser.add_argument(
-        "--system",
-        type=system_id,
-        metavar="N",
-        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
-    )
+    autopilot_options(parser, required=True)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="the voyage folder (default: voyages/<UTC time>-<mission>)"
     )
@@ -137,14 +134,7 @@ def _add_shore(parser: argparse.ArgumentParser) -> None:
         help="let who has the token in this file (made, mode 0600, where there is none) give orders "
         "from the page, as [operator] local_orders permits",
     )
-    parser.add_argument(
-        "--http-name",
-        type=host_name,
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="a further name under which this machine's page may be asked for",
-    )
+    host_names_option(parser)
     chart_option(parser)
     parser.add_argument(
         "--far",

@@ -13,7 +13,7 @@ from typing import Any
 
 from companion.commands.output import Folding, force_option, write_files
 from companion.errors import InputError
-from companion.program.arguments import chart_option, host_name, http_address, out_file, system_id
+from companion.program.arguments import chart_option, host_names_option, http_address, out_file, system_id
 from companion.words import counted
 
 PORT = 8765
@@ -64,14 +64,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         metavar="[HOST:]PORT",
         help=f"where to serve it (default: 127.0.0.1:{PORT})",
     )
-    parser.add_argument(
-        "--http-name",
-        type=host_name,
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="a further name under which this machine's page may be asked for",
-    )
+    host_names_option(parser)
     chart_option(parser)
     parser.add_argument("--export", type=out_file, metavar="FILE.html", help="write one file and serve nothing")
     force_option(parser)

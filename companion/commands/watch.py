@@ -21,7 +21,7 @@ from companion.disk import reason
 from companion.errors import InputError, LinkError
 from companion.messages import VehicleState
 from companion.orders import Answer, Wanted, give
-from companion.program.arguments import number, system_id
+from companion.program.arguments import number, radio_option, system_option
 from companion.view import Event, HeardFold, View
 
 EXIT_NO_LINK = 3
@@ -40,13 +40,9 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Keys: q end, ? help. Exit codes: 0 ended by a key or Ctrl-C, 3 no link, or nothing heard "
         "(without a terminal). Examples: companion watch --link /dev/ttyUSB0:57600; companion watch --socket boat.sock",
     )
-    parser.add_argument(
-        "--link", metavar="LINK", help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
-    )
+    radio_option(parser, required=False)
     parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
-    parser.add_argument(
-        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
-    )
+    system_option(parser)
     parser.add_argument(
         "--signing-key",
         type=Path,

@@ -158,6 +158,51 @@ def chart_option(parser: ArgumentParser) -> None:
     )
 
 
+def host_names_option(parser: ArgumentParser) -> None:
+    """Add the option of further names under which a page may be asked for."""
+    parser.add_argument(
+        "--http-name",
+        type=host_name,
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="a further name under which this machine's page may be asked for",
+    )
+
+
+def radio_option(parser: ArgumentParser, *, required: bool = True) -> None:
+    """Add the link to a boat from ashore."""
+    parser.add_argument(
+        "--link",
+        required=required,
+        metavar="LINK",
+        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+
+
+def system_option(parser: ArgumentParser) -> None:
+    """Add which autopilot on the link is meant."""
+    parser.add_argument(
+        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
+    )
+
+
+def autopilot_options(parser: ArgumentParser, *, required: bool) -> None:
+    """Add the link to the autopilot from on board, and which autopilot on it is meant."""
+    parser.add_argument(
+        "--link",
+        required=required,
+        metavar="LINK",
+        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+    )
+    parser.add_argument(
+        "--system",
+        type=system_id,
+        metavar="N",
+        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
+    )
+
+
 def host_name(text: str) -> str:
     """Return the name of a machine."""
     if not _HOST.fullmatch(text):

@@ -20,6 +20,25 @@ def wind_of(text: str) -> tuple[float, float]:
     return STEADY if text == "steady" else shifts(text)
 
 
+def add_voyages(parser: argparse.ArgumentParser, *, usual: str) -> None:
+    """Add which scenarios are sailed (``usual``: what they are by default, in words), with which seeds, how fast."""
+    parser.add_argument(
+        "--scenarios",
+        type=scenario_file,
+        nargs="+",
+        metavar="SCENARIO",
+        help=f"scenario files, or names of ours (default: {usual})",
+    )
+    parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
+    parser.add_argument(
+        "--speedup",
+        type=number(above=0.0, at_most=1000.0),
+        default=20.0,
+        metavar="X",
+        help="of the real ArduRover (default: 20)",
+    )
+
+
 def add_winds(parser: argparse.ArgumentParser) -> None:
     """Add the options that ``sitl regret`` has, too."""
     parser.add_argument(
@@ -51,21 +70,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
     parser.add_argument(
         "--who", nargs="+", choices=SAILORS, default=list(USUAL), help="sailors (default: all but the last two)"
     )
-    parser.add_argument(
-        "--scenarios",
-        type=scenario_file,
-        nargs="+",
-        metavar="SCENARIO",
-        help="scenario files, or names of ours (default: the six)",
-    )
-    parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
-    parser.add_argument(
-        "--speedup",
-        type=number(above=0.0, at_most=1000.0),
-        default=20.0,
-        metavar="X",
-        help="of the real ArduRover (default: 20)",
-    )
+    add_voyages(parser, usual="the six")
     add_winds(parser)
     add_options(parser, workers=1, out=Path("baselines.jsonl"))
     parser.set_defaults(run=run)

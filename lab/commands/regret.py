@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from companion.program.arguments import number, out_file, whole
-from lab.commands.baselines import SAILORS, add_winds
-from sitl.commands.run import scenario_file
+from companion.program.arguments import out_file
+from lab.commands.baselines import SAILORS, add_voyages, add_winds
 from sitl.options import add_options, options_of
 
 
@@ -30,21 +29,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         default=["companion", "fixed", "alone-embedded"],
         help="sailors (default: companion fixed alone-embedded)",
     )
-    parser.add_argument(
-        "--scenarios",
-        type=scenario_file,
-        nargs="+",
-        metavar="SCENARIO",
-        help="scenario files, or names of ours (default: the six of sitl baselines)",
-    )
-    parser.add_argument("--seeds", type=whole(at_least=1), default=5, metavar="N", help="seeds 0..N-1 (default: 5)")
-    parser.add_argument(
-        "--speedup",
-        type=number(above=0.0, at_most=1000.0),
-        default=20.0,
-        metavar="X",
-        help="of the real ArduRover (default: 20)",
-    )
+    add_voyages(parser, usual="the six of sitl baselines")
     parser.add_argument("--json", type=out_file, metavar="FILE", help="write the table's figures")
     parser.add_argument(
         "--plot",
