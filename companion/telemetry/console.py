@@ -31,7 +31,7 @@ from companion.skipper.planning import next_tack, on_leg
 from companion.skipper.step import Announce, Phase, Snapshot
 from companion.telemetry.folder.records import sigma_ahead_rad
 from companion.telemetry.status import CLOCK_OFF_S, goal_distance_m
-from companion.words import clearance_words, one_line, printable
+from companion.words import brief_time, clearance_words, one_line, printable
 
 NEAR_M = 1.0  # what is so near to her way is what a clearance below nought is of
 MOST_WAITING = 64  # lines; a reader that is this far behind misses the next
@@ -305,16 +305,16 @@ def progress_text(step: Step) -> str:
     if state.progress.task:
         parts.append(state.progress.task)
     if state.orders.standing is not None:
-        minutes = state.orders.standing.age_s(snapshot.t_s) / 60.0
-        parts.append(f"order {state.orders.standing.words} of {state.orders.standing.by}, {minutes:.0f} min")
+        standing = state.orders.standing
+        parts.append(f"order {standing.words} of {standing.by}, {brief_time(standing.age_s(snapshot.t_s))}")
     if route is not None:
         clearance_m = None if sailed is None or not under_way else sailed.clearance_ahead_m(state.mission.index)
         if clearance_m is not None:
             parts.append(f"clearance expected {clearance_words(clearance_m, _where(step))}")
         eta = step.eta()
         if under_way and eta.there_s is not None:
-            late = "" if eta.there_late_s is None else f" (90 %: {eta.there_late_s:.0f} s)"
-            parts.append(f"there in {eta.there_s:.0f} s{late}")
+            late = "" if eta.there_late_s is None else f" (90 %: {brief_time(eta.there_late_s)})"
+            parts.append(f"there in {brief_time(eta.there_s)}{late}")
         parts.append(f"replans {state.plans.replans}")
     parts += in_words(figure_values(step, "line"))
     if not under_way or state.phase not in {Phase.STANDARD, Phase.DESTINATION_APPROACH, Phase.BUOY_APPROACH}:
