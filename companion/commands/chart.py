@@ -13,7 +13,7 @@ from companion.program.arguments import add_command, moment, number, place
 from companion.words import counted, file_name, listed
 
 if TYPE_CHECKING:
-    from companion.chart import Chart, ChartArea
+    from companion.chart import Chart, ChartArea, Wanted
     from companion.current import TideRow
     from companion.geofence.mission import MissionOptions
     from companion.messages import GeoPoint
@@ -184,7 +184,7 @@ def _state_in(named: str) -> Path:
 
 
 def _import(args: argparse.Namespace) -> int:
-    from companion.chart import TOLERANCE_M, Wanted, area_of, box_about, read_chart, told_of
+    from companion.chart import TOLERANCE_M, Wanted, area_of
     from companion.geofence import Charted
 
     center, reach_m, places, options = _water(args)
@@ -206,21 +206,7 @@ def _import(args: argparse.Namespace) -> int:
         floats_m=floats_m,
         restricted=args.restricted,
     )
-    charts: list[Chart] = []
-    for name in args.files:
-        chart = read_chart(
-            Path(name), box_about(center, reach_m), wanted, positive=args.positive, without_depths=args.without_depths
-        )
-        for finding in chart.findings:
-            print(finding.line(name))
-        if chart.is_elsewhere:  # one of many cells, perhaps
-            continue
-        charts.append(chart)
-        source = "" if str(chart.source) in {name, Path(name).name} else f"{chart.source}: "
-        print(
-            f"{name}: {source}{told_of(chart)}"
-            + ("" if chart.knows_depths else "; it tells no depths of the water between")
-        )
+    charts = _read_charts(args, center, reach_m, wanted)
     if not charts:
         what = f"{args.files[0]} holds nothing" if len(args.files) == 1 else "no file holds anything"
         raise JobError(f"{obstacles}: not written: {what} of the water that is asked for")
@@ -245,27 +231,60 @@ def _import(args: argparse.Namespace) -> int:
         f"within {reach_m:.0f} m of {center.lat_deg:.5f}, {center.lon_deg:.5f}; solid is what is less deep than "
         f"{depth_m:g} m" + (f" with {tide_m:g} m of tide" if table else "")
     )
-    if area.drying:
-        print(
-            f"{drying}: written: {counted(len(area.drying), 'piece')} of water that is too shallow at some hours only"
-        )
-    elif args.drying:
-        old = ", and the one that is there is of before: leave it out of [area] drying" if drying.exists() else ""
-        print(f"{drying}: not written: no tide of the table makes deep enough what is too shallow here{old}")
-    print(f"{fence}: written: the edge of it")
+    _tell_written(area, fence, drying, is_drying=args.drying)
     if any(s.doubt_m == args.most_doubt > 0.0 for s in area.solids):
         print(f"surveys here are so doubtful that margins would be wider: cut at {args.most_doubt:g} m (--most-doubt)")
     told = f', drying = ["{drying.name}"]' if area.drying else ""
     print(f'in the mission: [area] obstacles = ["{obstacles.name}"], fence = "{fence.name}"{told}')
-    if args.depth is not None and options is not None and options.boat.draft_m is not None:
-        own_m = options.boat.draft_m + options.area.under_keel_m
-        if own_m > args.depth:
-            print(f"--depth {args.depth:g} is less than the {own_m:g} m of the mission's draft_m and under_keel_m")
+    _tell_shallower(args.depth, options)
     bad = _troubles(area, places)
     for line in bad:
         print(line)
     print("not fit for navigation: look at it before it is sailed by")
     return int(bool(bad))
+
+
+def _read_charts(args: argparse.Namespace, center: GeoPoint, reach_m: float, wanted: Wanted) -> list[Chart]:
+    """Return the charts that hold something of the water, and say what each is and what is wrong with it."""
+    from companion.chart import box_about, read_chart, told_of
+
+    charts: list[Chart] = []
+    for name in args.files:
+        chart = read_chart(
+            Path(name), box_about(center, reach_m), wanted, positive=args.positive, without_depths=args.without_depths
+        )
+        for finding in chart.findings:
+            print(finding.line(name))
+        if chart.is_elsewhere:  # one of many cells, perhaps
+            continue
+        charts.append(chart)
+        source = "" if str(chart.source) in {name, Path(name).name} else f"{chart.source}: "
+        print(
+            f"{name}: {source}{told_of(chart)}"
+            + ("" if chart.knows_depths else "; it tells no depths of the water between")
+        )
+    return charts
+
+
+def _tell_written(area: ChartArea, fence: Path, drying: Path, *, is_drying: bool) -> None:
+    """Say what is written beside the obstacles; ``is_drying``: water that is solid at some hours was asked for."""
+    if area.drying:
+        print(
+            f"{drying}: written: {counted(len(area.drying), 'piece')} of water that is too shallow at some hours only"
+        )
+    elif is_drying:
+        old = ", and the one that is there is of before: leave it out of [area] drying" if drying.exists() else ""
+        print(f"{drying}: not written: no tide of the table makes deep enough what is too shallow here{old}")
+    print(f"{fence}: written: the edge of it")
+
+
+def _tell_shallower(depth_m: float | None, options: MissionOptions | None) -> None:
+    """Say where ``--depth`` is less than what the mission's boat needs."""
+    if depth_m is None or options is None or options.boat.draft_m is None:
+        return
+    own_m = options.boat.draft_m + options.area.under_keel_m
+    if own_m > depth_m:
+        print(f"--depth {depth_m:g} is less than the {own_m:g} m of the mission's draft_m and under_keel_m")
 
 
 def _water(args: argparse.Namespace) -> tuple[GeoPoint, float, list[tuple[str, GeoPoint]], MissionOptions | None]:
