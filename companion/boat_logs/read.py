@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from companion.boat import BoatLog
 from companion.boat_logs.recordings import State, Tlog, dataflash, messages_of
-from companion.boat_logs.rows import AT_REST, Rows, Useless, Winds
+from companion.boat_logs.rows import AT_REST, Rows, UnusableLogError, Winds
 from companion.boat_logs.text import read_csv, read_nmea
 from companion.errors import InputError, unreadable
 from companion.telemetry.folder import TLOG, TRACK, parts
@@ -100,7 +100,7 @@ def read_logs(
         tell(count, str(path))
         try:
             one = _read(path)
-        except Useless as why:
+        except UnusableLogError as why:
             skipped.append(Skipped(name=str(path), why=str(why)))
             continue
         except InputError as error:
@@ -131,7 +131,7 @@ def read_wind(path: Path) -> Record:
     try:
         _fill([path], [data], rows)
         return rows.record(path.name)
-    except Useless as why:
+    except UnusableLogError as why:
         raise InputError(str(path), "", str(why), "log or request WIND (message 168)") from None
 
 
@@ -142,10 +142,10 @@ def _read(path: Path) -> ReadLog:
     else:
         files = [path]
     if not files[0].is_file():
-        raise Useless("it is no file")
+        raise UnusableLogError("it is no file")
     data = [bytes_of(p) for p in files]
     if not any(data):
-        raise Useless("it is empty")
+        raise UnusableLogError("it is empty")
     digest = hashlib.sha256(b"".join(data)).hexdigest()[:16]
     rows = Rows()
     system = _fill(files, data, rows)
@@ -165,7 +165,7 @@ def _fill(files: list[Path], data: list[bytes], rows: Rows) -> int | None:
         else:
             read_nmea(data[0], rows)
     except (gzip.BadGzipFile, csv.Error) as error:
-        raise Useless(f"it is damaged ({str(error)[:60]})") from None
+        raise UnusableLogError(f"it is damaged ({str(error)[:60]})") from None
     return None
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from companion.boat_logs.rows import REBOOT_BACK_S, Useless
+from companion.boat_logs.rows import REBOOT_BACK_S, UnusableLogError
 from companion.mavlink.tlog import read_tlog
 from companion.mavlink.wire import Dialect, since_boot_s
 
@@ -25,7 +25,7 @@ class Tlog:
     """The autopilot's messages of a .tlog in its parts, those of ``numbers`` alone.
 
     Iterated over it yields (time, message): the autopilot's own clock, set once by that of whoever wrote the log and
-    again after a reboot [Unix s]. Raises Useless in the middle of it: a second boat was heard.
+    again after a reboot [Unix s]. Raises UnusableLogError in the middle of it: a second boat was heard.
     """
 
     files: list[Path]
@@ -60,7 +60,7 @@ class Tlog:
         self.systems.add(system)
         if len(self.systems) > 1:
             said = " and ".join(str(s) for s in sorted(self.systems))
-            raise Useless(f"it tells of two boats, systems {said}: record them apart")
+            raise UnusableLogError(f"it tells of two boats, systems {said}: record them apart")
 
     def _heard(self) -> Iterator[tuple[float, Any]]:
         dialect = Dialect(None)
@@ -79,19 +79,19 @@ class Tlog:
 
 @contextlib.contextmanager
 def dataflash(path: Path, data: bytes) -> Iterator[Any]:
-    """Open an autopilot's own log. Raises Useless: it is none, or what is read of its messages is not in them."""
+    """Open an autopilot's own log. Raises UnusableLogError: it is none, or lacks columns that are read."""
     from pymavlink import DFReader
 
     if data[:3] != _BIN_HEAD:
-        raise Useless("it is no .BIN log: it does not begin as one")
+        raise UnusableLogError("it is no .BIN log: it does not begin as one")
     try:
         log = DFReader.DFReader_binary(str(path))
     except Exception as error:  # it raises what its parsing happens to meet
-        raise Useless(f"it is no .BIN log ({str(error)[:60] or type(error).__name__})") from None
+        raise UnusableLogError(f"it is no .BIN log ({str(error)[:60] or type(error).__name__})") from None
     try:
         yield log
     except AttributeError as missing:
-        raise Useless(f"its messages are another release's: they have no column {missing}") from None
+        raise UnusableLogError(f"its messages are another release's: they have no column {missing}") from None
     finally:
         log.close()
 

@@ -29,7 +29,7 @@ _NAN = math.nan
 _NOWHERE = GeoPoint(lat_deg=0.0, lon_deg=0.0)  # what the wind on board does not depend on
 
 
-class Useless(Exception):  # noqa: N818 - it never leaves this room
+class UnusableLogError(Exception):  # never leaves this room
     """A log is of no use, and why."""
 
 
@@ -93,10 +93,10 @@ class Rows:
         return felt.awa_rad, felt.aws_mps
 
     def log(self, name: str) -> BoatLog:
-        """Return the log. Raises Useless: it is none to learn from."""
+        """Return the log. Raises UnusableLogError: it is none to learn from."""
         table = np.array(self.rows, dtype=np.float64).reshape(len(self.rows), 11)
         if 0 < len(table) < LEAST_SAMPLES:
-            raise Useless(
+            raise UnusableLogError(
                 f"it is too short: {counted(len(table), 'sample')}, one a second, of {LEAST_SAMPLES} at least"
             )
         for what, column, remedy in (
@@ -106,7 +106,7 @@ class Rows:
         ):
             known = int(np.sum(np.isfinite(table[:, column])))
             if known < LEAST_SAMPLES:
-                raise Useless(
+                raise UnusableLogError(
                     f"it tells {what} in {known} of {counted(len(table), 'sample')}, of {LEAST_SAMPLES} at least "
                     f"({remedy})"
                 )
@@ -145,10 +145,10 @@ class Winds(Rows):
         """Keep nothing: the wind's own readings are kept."""
 
     def record(self, name: str) -> Record:
-        """Return the record. Raises Useless: there is no wind in it."""
+        """Return the record. Raises UnusableLogError: there is no wind in it."""
         known = [row for row in self.winds if all(math.isfinite(v) for v in row[:3]) and row[2] >= 0.0]
         if len(known) < 2:
-            raise Useless(f"{len(known)} WIND messages")
+            raise UnusableLogError(f"{len(known)} WIND messages")
         t, twd, tws, heading, awa = np.array(known, dtype=np.float64).T
         turning = np.zeros(t.shape, dtype=np.bool_)
         if self.bows:

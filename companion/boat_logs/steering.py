@@ -14,7 +14,7 @@ from companion.boat import SteeringLog
 from companion.boat.steering import STEP_S, runs_of
 from companion.boat_logs.read import MESSAGES, Skipped, bytes_of
 from companion.boat_logs.recordings import State, Tlog, dataflash, messages_of
-from companion.boat_logs.rows import AT_REST, LEAST_SAMPLES, Useless
+from companion.boat_logs.rows import AT_REST, LEAST_SAMPLES, UnusableLogError
 from companion.errors import InputError
 from companion.geo.angles import wrap_pi_array
 from companion.messages import Mode
@@ -84,13 +84,13 @@ class _Series:
     def log(self, name: str) -> SteeringLog:
         bow = self.values.get("heading", [])
         if len(bow) < LEAST_SAMPLES:
-            raise Useless(f"it tells the heading {counted(len(bow), 'time')}, of {LEAST_SAMPLES} at least")
+            raise UnusableLogError(f"it tells the heading {counted(len(bow), 'time')}, of {LEAST_SAMPLES} at least")
         if self.servos:
             self._rudder_from_servos()
         known = len(self.values.get("rudder", []))
         if known < LEAST_SAMPLES:
             told = f"it tells where the rudder was {counted(known, 'time')}, of {LEAST_SAMPLES} at least"
-            raise Useless(f"{told} (STER in a .BIN, SERVO_OUTPUT_RAW in a .tlog)")
+            raise UnusableLogError(f"{told} (STER in a .BIN, SERVO_OUTPUT_RAW in a .tlog)")
         t = np.arange(bow[0][0], bow[-1][0], STEP_S)
         heading = self.angle_at("heading", t)
         ahead = self.at("ve", t) * np.sin(heading) + self.at("vn", t) * np.cos(heading)
@@ -148,7 +148,7 @@ def read_steering(paths: list[Path]) -> tuple[list[SteeringLog], list[Skipped]]:
     for path in paths:
         try:
             read.append(_steering(path))
-        except Useless as why:
+        except UnusableLogError as why:
             skipped.append(Skipped(name=str(path), why=str(why)))
         except InputError as error:
             skipped.append(Skipped(name=str(path), why=error.problem))
@@ -159,14 +159,14 @@ def _steering(path: Path) -> SteeringLog:
     series = _Series()
     files = [p for p in parts(path / TLOG) if p.stat().st_size > 0] if path.is_dir() else [path]
     if files and not any(p.stat().st_size for p in files):
-        raise Useless("it is empty")
+        raise UnusableLogError("it is empty")
     name = files[0].name.lower().removesuffix(".gz") if files else ""
     if name.endswith(".bin"):
         _steering_of_bin(path, bytes_of(path), series)
     elif name.endswith(".tlog") or TLOG in name:
         _steering_of_tlog(files, series)
     else:
-        raise Useless("only .BIN and .tlog tell how it was steered")
+        raise UnusableLogError("only .BIN and .tlog tell how it was steered")
     return series.log(str(path))
 
 

@@ -8,7 +8,7 @@ import io
 import math
 from collections.abc import Iterator
 
-from companion.boat_logs.rows import AT_REST, Rows, Useless
+from companion.boat_logs.rows import AT_REST, Rows, UnusableLogError
 from companion.disk import unpacked
 from companion.geo import MPS_PER_KNOT
 
@@ -26,7 +26,7 @@ def read_csv(data: bytes, rows: Rows) -> None:
     reader = csv.DictReader(io.StringIO(text.lstrip("\ufeff")))
     names = {(n or "").strip().lower(): n for n in reader.fieldnames or []}
     if not {"t_s", "time"} & set(names):
-        raise Useless("its first line names no column t_s or time")
+        raise UnusableLogError("its first line names no column t_s or time")
     for row in reader:
         t_s = _time(row.get(names["t_s"]) if "t_s" in names else row.get(names["time"]))
         if t_s is None:
