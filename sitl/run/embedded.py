@@ -36,7 +36,7 @@ from companion.mission_check import require_sailable
 from companion.page import Address
 from companion.skipper.behaviors import CALL
 from companion.skipper.step import Announce
-from companion.telemetry.folder import STATE, SUMMARY, VERDICT
+from companion.telemetry.folder import STATE, SUMMARY, VERDICT, VoyageArchive
 from companion.wind import Estimator, WindTracker
 from sitl.autopilot import AutopilotConfig, MemoryLink, SimulatedAutopilot, serve
 from sitl.faults import (
@@ -78,6 +78,7 @@ from sitl.world import Seabed
 
 TRUTH_EVERY_S = 0.25
 MAX_TRUTH_SAMPLES = 20_000
+NEAR_M = 3000.0  # within which of another vessel the truth is watched as often as on a short voyage
 # Effort of one plan under the virtual clock, where time cannot stop it.
 EXPANSIONS = 15_000
 
@@ -178,11 +179,13 @@ async def run_embedded(
     observer: Observer | None = None,
     worker_pace: float | None = None,
     variation: Variation | None = None,
+    archive: VoyageArchive | None = None,
 ) -> ScenarioVerdict:
     """Sail ``scenario`` on the embedded autopilot; leaves a voyage folder with verdict.json.
 
     With ``worker_pace`` (loop seconds per second, on a loop in real time that begins at 0) the planner is the real
     worker process, and plans by its budget of time. ``variation``: what is another in the mission than its file says.
+    ``archive``: the folder of ``folder``, and what all voyages in it may take; None: they are left alone.
     """
     mission, radio_port = with_radio(mission_of(scenario, source), scenario)
     depths_port = sounder_port(mission, scenario)
@@ -247,7 +250,9 @@ async def run_embedded(
             *([asyncio.create_task(world.satellite.run(), name="satellite")] if world.satellite is not None else []),
             *(asyncio.create_task(inject(world, e), name=f"event {e.kind}") for e in scenario.events),
         ]
-        await _sail_and_restart(world, scenario, mission, seed, folder, on_status, expansions, worker_pace, room)
+        await _sail_and_restart(
+            world, scenario, mission, seed, folder, on_status, expansions, worker_pace, room, archive
+        )
         for task in side_tasks:
             task.cancel()
         for task in side_tasks:
@@ -298,6 +303,7 @@ async def _sail_and_restart(
     expansions: int | None,
     worker_pace: float | None,
     room: Callable[[Estimator], WindTracker] | None,
+    archive: VoyageArchive | None,
 ) -> None:
     """Run the companion; kill it where the scenario says, and start it again."""
     kills = sorted((e for e in scenario.events if e.kind == "kill_companion"), key=lambda e: e.at_s)
@@ -312,6 +318,7 @@ async def _sail_and_restart(
         state_path=folder / STATE,
         disk=world.disk,
         command=f"sitl run {scenario.name}",
+        archive=archive,
         exit_on_arrival=scenario.exit_on_arrival,
         dry_run=scenario.dry_run,
         far=None
@@ -451,4 +458,5 @@ async def _watch_truth(world: SimulatedWorld, frame: LocalFrame, limit_s: float)
             world.others.note(world.truth, here, now_s())
         if world.observer is not None:
             world.observer.truth(now_s(), world.autopilot, world.link)
-        await asyncio.sleep(every_s)
+        is_met = every_s > TRUTH_EVERY_S and world.others.nearest_m(frame.en_from_geo(t.position), now_s()) < NEAR_M
+        await asyncio.sleep(TRUTH_EVERY_S if is_met else every_s)

@@ -252,9 +252,9 @@ EventKind = Literal[
     "order",  # order: to the companion, in words (a goal at east_m, north_m); answer: what it must be
     "far_order",  # order, expires_s, late_s: over the satellite link, sent again until it is answered; answer
     "crew",  # anchors react_s after the companion first calls for it, weighs after for_s
-    "vessel",  # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m: a ship passes
-    "intruder",  # gap_m off our boat on bearing_deg from its bow, sog_mps: on collision course, told by radio
-    "meeting",  # course_deg off ours, sog_mps, meet_s, miss_m, craft, manner, react_s, length_m, receiver: keeps watch
+    "vessel",  # east_m, north_m (then), course_deg, sog_mps, every_s, is_on_ais, length_m, for_s: a ship passes
+    "intruder",  # gap_m off our boat on bearing_deg off its bow, sog_mps, for_s: on collision course, told by radio
+    "meeting",  # course_deg off us, sog_mps, meet_s, miss_m, craft, manner, react_s, length_m, receiver, for_s: watches
     "second_boat",  # east_m, north_m, goal_east_m, goal_north_m: VAIMOS's model, steered by field, told by radio
 ]
 

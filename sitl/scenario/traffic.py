@@ -284,7 +284,8 @@ class Others:
         """Tell of them at the UDP ``port`` of this machine (0: by nothing), AIS to ``hear`` if that is given."""
         self._frame, self._wind, self._seed = frame, wind, seed
         self._port, self._hear = port, hear or self._receive
-        self._vessels: list[Moving] = []
+        self._vessels: list[Moving] = []  # that are there
+        self._count = 0  # of all that were
         self._second: SecondBoat | None = None
 
     def note(self, truth: TrueTrack, here_en_m: tuple[float, float], t_s: float) -> None:
@@ -312,15 +313,28 @@ class Others:
         if self._second is not None:
             truth.second_boat_m = self._second.nearest_goal_m
 
+    def nearest_m(self, here_en_m: tuple[float, float], t_s: float) -> float:
+        """Return how far the nearest of them is [m]; inf where there is none."""
+        return min((distance_m(vessel, here_en_m, t_s) for vessel in self._vessels), default=math.inf)
+
     async def play(self, event: EventSpec, began_s: float, ours: Callable[[], tuple[Motion, float]]) -> None:
-        """Sail the vessel of ``event`` until cancelled, and tell of it every ``every_s``.
+        """Sail the vessel of ``event`` until cancelled or for ``for_s``, and tell of it every ``every_s``.
 
         Args:
             event: one of ``TRAFFIC``, whose time has come.
             began_s: when the scenario began, of the loop's clock [s].
             ours: where our boat is, how it moves, and its heading [rad].
         """
-        number = len(self._vessels)
+        number, self._count = self._count, self._count + 1
+        try:
+            async with asyncio.timeout(event.for_s):
+                await self._play(event, number, began_s, ours)
+        except TimeoutError:  # out of sight
+            self._vessels = [vessel for vessel in self._vessels if vessel.mmsi != FIRST_MMSI + number]
+
+    async def _play(
+        self, event: EventSpec, number: int, began_s: float, ours: Callable[[], tuple[Motion, float]]
+    ) -> None:
         if event.kind == "vessel":
             ship = ship_of(event, number)
             self._vessels.append(ship)

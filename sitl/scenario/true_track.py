@@ -82,7 +82,7 @@ TACK_SETTLED_S = 3.0
 
 @dataclass(slots=True)
 class TrueTrack:
-    """The true track, sampled at a fixed rate from setting sail on."""
+    """The true track, sampled from setting sail on: at one rate, on long voyages oftener near another vessel."""
 
     t_s: list[float] = field(default_factory=list)
     en_m: list[tuple[float, float]] = field(default_factory=list)

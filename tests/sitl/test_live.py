@@ -140,6 +140,24 @@ def test_a_ship_without_ais_is_judged_and_not_told():
     assert truth.vessels_m["211000001"] == pytest.approx(292.0, abs=0.1)  # half a beam off its middle
 
 
+def test_a_ship_whose_time_is_over_is_neither_told_nor_measured():
+    event = EventSpec(at_s=0.0, kind="vessel", east_m=300.0, course_deg=0.0, sog_mps=5.0, every_s=5.0, for_s=22.0)
+    reports, truth = run_virtual(heard_for(90, event, 0.0))
+    assert [report.t_s for report in reports] == pytest.approx([0.0, 5.0, 10.0, 15.0, 20.0], abs=1.0)
+    assert truth.vessels_m["211000001"] == pytest.approx(292.0, abs=1.0)  # as it was while it was there
+
+    async def looked():
+        others = Others(FRAME, Constant(0.0, 5.0), 0, port=0, hear=lambda _: None)
+        playing = asyncio.create_task(others.play(event, 0.0, lambda: (((0.0, 0.0), (0.0, 0.0)), 0.0)))
+        await asyncio.sleep(20.0)
+        near = others.nearest_m((0.0, 0.0), now_s())
+        await asyncio.sleep(20.0)
+        await playing  # it is over
+        return near, others.nearest_m((0.0, 0.0), now_s())
+
+    assert run_virtual(looked()) == (pytest.approx(263.0, abs=50.0), math.inf)
+
+
 def test_an_intruder_comes_at_our_boat():
     event = EventSpec(at_s=0.0, kind="intruder", gap_m=70.0, bearing_deg=45.0, sog_mps=3.0, every_s=1.0)
     reports, truth = run_virtual(heard_for(40, event, 0.0))
