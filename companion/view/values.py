@@ -475,7 +475,7 @@ class View:
     health: tuple[Part, ...] = ()
 
 
-MOST = 3600  # samples kept: an hour at one a second, a day at one in 24 s
+MOST = 3600  # samples kept: an hour at one a second, of weeks half an hour of that and each quarter of an hour
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -527,11 +527,14 @@ class Past:
 
 
 class Trail:
-    """The samples of a voyage under way: the newest in full, and from ``MOST`` on every second of the older half."""
+    """The samples of a voyage under way: the newest half in full, of all before them one in so many, evenly."""
 
     def __init__(self, most: int = MOST) -> None:
         self._most = most
         self.samples: list[Sample] = []
+        self._older = 0  # so many of them are of the older half ...
+        self._passed = 0  # ... into which so many have come ...
+        self._every = 1  # ... and of which one in so many was kept
 
     def follow(self, before: LocalFrame, after: LocalFrame) -> None:
         """Let the metres of all samples count in another frame."""
@@ -542,9 +545,18 @@ class Trail:
     def add(self, sample: Sample) -> None:
         """Take the next one."""
         self.samples.append(sample)
-        if len(self.samples) > self._most:
-            half = self._most // 2
-            self.samples = [*self.samples[:half][::2], *self.samples[half:]]
+        newest = self._most // 2
+        if len(self.samples) - self._older <= newest:
+            return
+        if self._passed % self._every == 0:
+            self._older += 1
+        else:
+            del self.samples[self._older]
+        self._passed += 1
+        if self._older > self._most - newest:
+            older = self.samples[: self._older][::2]
+            self.samples = [*older, *self.samples[self._older :]]
+            self._older, self._every = len(older), 2 * self._every
 
 
 def _carried(sample: Sample, shift: Shift) -> Sample:

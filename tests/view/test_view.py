@@ -587,3 +587,21 @@ def test_metres_are_rounded_once_where_they_are_shown(beat):
         assert view.boat.cross_track_m == pytest.approx(row["cross_track_m"], abs=0.011)
         seen += 1
     assert seen > 60
+
+
+@pytest.mark.parametrize("days", [0.04, 1.0, 20.0])
+def test_of_a_voyage_of_weeks_the_page_keeps_all_of_the_track_evenly(days):
+    """The older half was halved again and again: of a day the first twenty hours were one straight line."""
+    trail, most = values.Trail(most=40), 40
+    last = round(days * 86_400.0 / 90.0)  # a sample each minute and a half, and ninetieths of what is kept
+    for n in range(last + 1):
+        trail.add(values.Sample(t_s=float(n)))
+    times = [sample.t_s for sample in trail.samples]
+    assert len(times) <= most
+    assert times[-20:] == [float(n) for n in range(last - 19, last + 1)]  # the newest in full
+    assert times[0] == 0.0
+    if last >= most:
+        gaps = np.diff(times[:-20])
+        assert len(set(gaps)) == 1
+        assert 9 <= len(gaps) <= 19
+        assert times[-20] - times[-21] <= gaps[0]
