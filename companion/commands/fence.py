@@ -18,7 +18,7 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, number, picture, place, radio_option, system_option
+from companion.program.arguments import add_command, number, picture, place, radio_options
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -101,8 +101,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser], 
 
 def link_options(parser: argparse.ArgumentParser) -> None:
     """Add --link, --system and --timeout."""
-    radio_option(parser)
-    system_option(parser)
+    radio_options(parser)
     parser.add_argument(
         "--timeout", type=number("s", above=0.0), default=10.0, metavar="S", help="wait this long for a heartbeat (10)"
     )

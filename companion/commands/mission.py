@@ -24,7 +24,16 @@ from companion.commands.output import (
     write_out,
 )
 from companion.errors import InputError, JobError
-from companion.program.arguments import add_command, host_name, http_address, number, picture, place, system_id, wind
+from companion.program.arguments import (
+    add_command,
+    host_names_option,
+    http_address,
+    number,
+    picture,
+    place,
+    system_id,
+    wind,
+)
 from companion.words import counted
 
 if TYPE_CHECKING:
@@ -451,14 +460,7 @@ def add_edit(verbs: argparse._SubParsersAction[argparse.ArgumentParser]) -> None
         metavar="[HOST:]PORT",
         help="where to serve it (default: a free port of this machine, for this machine only)",
     )
-    edit.add_argument(
-        "--http-name",
-        type=host_name,
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="a further name under which this machine's page may be asked for",
-    )
+    host_names_option(edit)
     edit.add_argument(
         "--chart",
         type=Path,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from companion.commands.output import force_option, write_files
 from companion.errors import InputError
 from companion.orders import TABLE, phrase
-from companion.program.arguments import number, radio_option, system_option
+from companion.program.arguments import number, radio_options
 
 if TYPE_CHECKING:
     from companion.orders import Answer, Wanted
@@ -54,9 +54,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("words", nargs="*", metavar="VERB [ARGS]", help="the order, see below")
-    radio_option(parser, required=False)
+    radio_options(parser, required=False)
     parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
-    system_option(parser)
     parser.add_argument(
         "--timeout",
         type=number("s", above=0.0),

@@ -12,7 +12,7 @@ from typing import Any
 
 from companion.geo.angles import direction
 from companion.orders import Verb
-from companion.program.arguments import number, radio_option, system_option
+from companion.program.arguments import number, radio_options
 from companion.words import counted
 
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
@@ -33,8 +33,7 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Exit codes: 0 all is well, 3 no link or no companion heard, 4 what was heard is old, 5 the companion "
         "raises an alarm. Example: companion status --link /dev/ttyUSB0:57600 --once",
     )
-    radio_option(parser)
-    system_option(parser)
+    radio_options(parser)
     parser.add_argument("--once", action="store_true", help="print one status and end")
     parser.add_argument("--json", action="store_true", help="JSON, one object per status; unknown is null")
     parser.add_argument(

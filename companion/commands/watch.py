@@ -21,7 +21,7 @@ from companion.disk import reason
 from companion.errors import InputError, LinkError
 from companion.messages import VehicleState
 from companion.orders import Answer, Wanted, give
-from companion.program.arguments import number, radio_option, system_option
+from companion.program.arguments import number, radio_options
 from companion.view import Event, HeardFold, View
 
 EXIT_NO_LINK = 3
@@ -40,9 +40,8 @@ def add_parser(subparsers: Any, summary: str) -> None:
         epilog="Keys: q end, ? help. Exit codes: 0 ended by a key or Ctrl-C, 3 no link, or nothing heard "
         "(without a terminal). Examples: companion watch --link /dev/ttyUSB0:57600; companion watch --socket boat.sock",
     )
-    radio_option(parser, required=False)
+    radio_options(parser, required=False)
     parser.add_argument("--socket", type=Path, metavar="PATH", help="on board, in place of a link: as the companion's")
-    system_option(parser)
     parser.add_argument(
         "--signing-key",
         type=Path,

@@ -170,36 +170,22 @@ def host_names_option(parser: ArgumentParser) -> None:
     )
 
 
-def radio_option(parser: ArgumentParser, *, required: bool = True) -> None:
-    """Add the link to a boat from ashore."""
-    parser.add_argument(
-        "--link",
-        required=required,
-        metavar="LINK",
-        help="/dev/ttyUSB0:57600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
-    )
-
-
-def system_option(parser: ArgumentParser) -> None:
-    """Add which autopilot on the link is meant."""
-    parser.add_argument(
-        "--system", type=system_id, metavar="N", help="the autopilot's MAVLink system id (default: the only one heard)"
-    )
+def radio_options(parser: ArgumentParser, *, required: bool = True) -> None:
+    """Add the link to a boat from ashore, and which autopilot on it is meant."""
+    _link_options(parser, "/dev/ttyUSB0:57600", "the only one heard", required=required)
 
 
 def autopilot_options(parser: ArgumentParser, *, required: bool) -> None:
     """Add the link to the autopilot from on board, and which autopilot on it is meant."""
+    _link_options(parser, "/dev/serial0:921600", "the mission's, else the only one heard", required=required)
+
+
+def _link_options(parser: ArgumentParser, serial: str, usual: str, *, required: bool) -> None:
     parser.add_argument(
-        "--link",
-        required=required,
-        metavar="LINK",
-        help="/dev/serial0:921600, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT",
+        "--link", required=required, metavar="LINK", help=f"{serial}, udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT"
     )
     parser.add_argument(
-        "--system",
-        type=system_id,
-        metavar="N",
-        help="the autopilot's MAVLink system id (default: the mission's, else the only one heard)",
+        "--system", type=system_id, metavar="N", help=f"the autopilot's MAVLink system id (default: {usual})"
     )
 
 
