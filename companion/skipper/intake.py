@@ -246,7 +246,8 @@ def _is_done(ctx: StepContext, route: Route, n: int, boat: PointEn) -> bool:
 def _own_count(ctx: StepContext) -> None:
     """Advance our own target by Büsser's double conditions; note when the autopilot lags behind it.
 
-    Where its number is not known to be of our route it is not known to lag.
+    Where its number is not known to be of our route it is not known to lag, nor while she still comes nearer to the
+    goal that its waypoint is of: beating to one she crosses a leg that leads back long before she is there.
     """
     boat, route = ctx.boat_en, ctx.state.mission.route
     if boat is None or route is None:
@@ -257,8 +258,18 @@ def _own_count(ctx: StepContext) -> None:
         if own > ctx.state.mission.index + 1:
             break
     lags = _counts(ctx) and own > ctx.state.mission.index
-    since = ctx.state.mission.passed_since_s if ctx.state.mission.passed_since_s is not None else ctx.t_s
+    since = ctx.state.mission.passed_since_s
+    if since is None or _comes_nearer(ctx, route, boat):
+        since = ctx.t_s
     ctx.set(mission=changed(ctx.state.mission, own_index=own, passed_since_s=since if lags else None))
+
+
+def _comes_nearer(ctx: StepContext, route: Route, boat: PointEn) -> bool:
+    """Return whether she is nearer than ever to the goal whose waypoint the autopilot steers for."""
+    gate, progress = ctx.gate, ctx.state.progress
+    if gate is None or gate.buoy_en_m is not None or route.gate_of[ctx.state.mission.index] != progress.gate:
+        return False
+    return distance_m(boat, gate.en_m) < progress.closest_m
 
 
 def _remember(ctx: StepContext) -> None:

@@ -26,7 +26,7 @@ from companion.skipper.step.state import PATIENT, Phase, Retry
 from companion.skipper.way.geometry import bearing_rad, moved
 from companion.skipper.way.line import ahead_m
 from companion.skipper.way.voyage import Box, Goal, Line, Side
-from tests.skipper.moments import moment, route
+from tests.skipper.moments import NOW_S, moment, route
 from tests.skipper.world import World, restarted, skipper, voyage, with_parts
 
 LINE = Line(port_en_m=(-25.0, 80.0), starboard_en_m=(25.0, 80.0), keep_m=5.0)
@@ -220,6 +220,25 @@ def test_the_waypoint_of_a_goal_is_not_left_before_it_while_we_steer(mode, gate_
     )
     _own_count(ctx)
     assert ctx.state.mission.own_index == own_index
+
+
+@pytest.mark.parametrize(
+    ("closest_m", "gate_of", "is_late"),
+    [(26.0, (0, 1, -1), False), (24.0, (0, 1, -1), True), (26.0, (-1, 1, -1), True)],
+)
+def test_the_autopilot_is_not_late_while_she_comes_nearer_to_the_goal(closest_m, gate_of, is_late):
+    """On a beat out and back she crossed the leg back; 15 s later the next item was made current: "reached, 26.4 m"."""
+    way = route((0.0, 100.0), (4.0, 0.0), (4.0, -30.0), gate_of=gate_of)
+    ctx = moment(
+        way,
+        goals=(Goal(en_m=(0.0, 100.0), radius_m=5.0), Goal(en_m=(4.0, 0.0), radius_m=5.0)),
+        at=(3.0, 75.0),
+        mission={"index": 0, "own_index": 1, "passed_since_s": NOW_S - 14.0, "checked": True},
+        config={"grid_size_m": 30.0},
+        progress={"closest_m": closest_m},
+    )
+    _own_count(ctx)
+    assert ctx.state.mission.passed_since_s == (NOW_S - 14.0 if is_late else NOW_S)
 
 
 @pytest.mark.parametrize("aside_m", [4.0, -4.0])
