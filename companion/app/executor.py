@@ -53,11 +53,12 @@ from companion.skipper.step import (
 MAX_WAITING = 16
 # Real time that a plan gets at least, however fast the simulator beside it: with less a busy machine finds no path.
 LEAST_BUDGET_S = 0.5
-# On a slow computer a plan that is not urgent gets more time: 2.3 times as long on a quarter of a core (4.6 s of 2).
-# The first one, for which she lies still, has so much of its budget of the processor itself (11 s on a tenth) ...
-LONGER_POWER, FIRST_SHARE, FIRST_MOST = 0.6, 0.55, 8.0
-# ... and one for a waypoint ahead, which is asked for the earlier the longer the last ones took, at the most ...
-AHEAD_MOST = 3.0
+# On a slow computer a plan that is not urgent gets more time. The first one, for which she lies still, has so much of
+# its budget of the processor itself: of 2 s it takes 4 on a quarter of a core, 10 on a tenth ...
+FIRST_SHARE, FIRST_MOST = 0.5, 8.0
+# ... and one for a waypoint ahead, which is asked for the earlier the longer the last ones took, 2.3 times as long on a
+# quarter of a core (4.6 s of 2).
+LONGER_POWER, AHEAD_MOST = 0.6, 3.0
 # An order ends so long before the skipper gives it up [s].
 EARLY_S = 2.0
 
@@ -219,11 +220,11 @@ class Executor:
 
     def _budget_s(self, request: RequestPlan) -> float:
         """Return the real time for a plan [s]: what was asked for, less beside a hurried simulator, never nothing."""
-        most = {ReplanReason.START: FIRST_MOST, ReplanReason.WAYPOINT: AHEAD_MOST}.get(request.reason, 1.0)
-        longer: float = self._planner.share**-LONGER_POWER
+        longer, share = 1.0, self._planner.share
         if request.reason is ReplanReason.START:
-            longer = max(longer, FIRST_SHARE / self._planner.share)
-        longer = min(most, longer)
+            longer = min(FIRST_MOST, max(1.0, FIRST_SHARE / share))
+        elif request.reason is ReplanReason.WAYPOINT:
+            longer = min(AHEAD_MOST, share**-LONGER_POWER)
         return max(min(request.budget_s, LEAST_BUDGET_S), longer * request.budget_s * self._budget_scale)
 
     async def _run_orders(self) -> None:
