@@ -16,7 +16,7 @@ from shapely.geometry.base import BaseGeometry
 
 BOARDS = 7
 OFF_NO_GO_DEG = 12.0  # so far from the no-go zone a beat is a leg, not a plan with tacks of its own
-REACH_DEG, BROAD_DEG, RUN_DEG = 90.0, 120.0, 155.0
+REACH_DEG, BROAD_DEG, RUN_DEG = 95.0, 120.0, 155.0  # of the ground: leeway makes the reach be sailed at 90
 REACH = 2.0  # boards long
 BOARD_S, LEAST_BOARD_S = 90.0, 40.0  # of a board; shorter ones leave no steady sailing between two tacks
 SCALES = np.linspace(1.0, LEAST_BOARD_S / BOARD_S, 8)
@@ -48,7 +48,7 @@ def trial_in(
     legs = [(beat_deg if n % 2 == 0 else -beat_deg, 1.0, f"tack {n}" if n else "begin") for n in range(BOARDS)]
     legs += [(REACH_DEG, REACH, "beat"), (-REACH_DEG, REACH, "reach there"), (BROAD_DEG, 1.0, "reach back")]
     legs += [(-BROAD_DEG, 1.0, "broad reach")]
-    down = BOARDS * math.cos(math.radians(beat_deg)) - 2.0 * math.cos(math.radians(180.0 - BROAD_DEG))
+    down = sum(share * math.cos(math.radians(a)) for a, share, _ in legs)
     runs = 2 * max(1, round(0.25 * down / math.cos(math.radians(180.0 - RUN_DEG))))
     length = down / runs / math.cos(math.radians(180.0 - RUN_DEG))
     legs += [

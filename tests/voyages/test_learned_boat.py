@@ -131,9 +131,11 @@ def test_a_trial_settles_what_a_reach_leaves_open(tmp_path, capsys):
     opened = ("reciprocal reach", "tacks seen", "nobody sailed a beat", "close-hauled on each tack", "a circle")
     said = " ".join(before.findings)
     assert [what for what in opened if what not in said] == []
-    said = " ".join(after.findings)
-    assert [what for what in opened if what in said] == []
-    assert "nobody sailed" not in said
-    assert after.tacks.tried >= 6
-    assert after.tacks.loss_s is not None
-    assert after.boat.common < 0.6 * before.boat.common
+    for seed in (3, 8):  # leeway and the wind's swing may turn a reach into a close reach there and back
+        after = sailed_in(tmp_path / "lake-trial.toml", 0.0, tmp_path / f"trial-{seed}", (seed,))
+        said = " ".join(after.findings)
+        assert [what for what in opened if what in said] == []
+        assert "nobody sailed" not in said
+        assert after.tacks.tried >= 6
+        assert after.tacks.loss_s is not None
+        assert after.boat.common < 0.6 * before.boat.common
