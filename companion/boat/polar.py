@@ -66,8 +66,10 @@ class Polar:
     tws_mps: NDArray[np.float64]
     speed_mps_table: NDArray[np.float64]
     name: str = ""
-    # the curve in the wind of the moment, which a step asks for several times: (wind speed, angles, boat speeds)
+    # the curves that were asked for last, which a step asks for several times: (wind speed, angles, boat speeds)
     _last: list[tuple[float, list[float], list[float]]] = field(default_factory=list, init=False, repr=False)
+    # the table as lists, made when one speed is first asked for: a step asks for fifty, each in a wind of its own
+    _lists: list[_Lists] = field(default_factory=list, init=False, repr=False)
 
     def __post_init__(self) -> None:
         twa = np.array(self.twa_rad, dtype=np.float64)
@@ -134,12 +136,16 @@ class Polar:
         """
         if not math.isfinite(twa_rad):
             raise ValueError("a true wind angle is not a finite number")
-        folded = abs((twa_rad + math.pi) % (2.0 * math.pi) - math.pi)
-        nodes, speed = self._curve_of(tws_mps)
+        folded = abs((float(twa_rad) + math.pi) % (2.0 * math.pi) - math.pi)
+        if not self._lists:
+            self._lists.append(_lists_of(self))
+        of, nodes = self._lists[0], self._lists[0].nodes
+        wind = of.wind(float(tws_mps))
         i = bisect.bisect_right(nodes, folded) - 1
         if i + 1 >= len(nodes) or nodes[i] == folded:
-            return speed[min(i, len(nodes) - 1)]
-        return (speed[i + 1] - speed[i]) / (nodes[i + 1] - nodes[i]) * (folded - nodes[i]) + speed[i]  # as np.interp
+            return of.speed(min(i, len(nodes) - 1), wind)
+        a, b = of.speed(i, wind), of.speed(i + 1, wind)
+        return (b - a) / (nodes[i + 1] - nodes[i]) * (folded - nodes[i]) + a  # as np.interp
 
     def _curve_of(self, tws_mps: float) -> tuple[list[float], list[float]]:
         """Return ``curve`` as lists."""
@@ -203,6 +209,53 @@ class Polar:
         best = np.flatnonzero(vmg >= np.max(vmg) - 1e-12)
         i = int(best[-1] if sign > 0.0 else best[0])
         return SailingAngle(twa_rad=float(angles[i]), speed_mps=float(speeds[i]), vmg_mps=float(vmg[i]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Lists:
+    """A polar's table for one speed at a time: what ``curve`` has, to the last bit, at two of its nodes.
+
+    ``first`` nodes stand before the table's, and behind them those whose speeds are ``shares`` of its last.
+    """
+
+    nodes: list[float]
+    first: int
+    shares: list[float]
+    tws_mps: list[float]
+    rows: list[list[float]]
+
+    def wind(self, tws_mps: float) -> tuple[int, float]:
+        """Return where a wind speed lies: the column before it and how far on to the next; -1: so much of the first."""
+        if not (math.isfinite(tws_mps) and tws_mps >= 0.0):
+            raise ValueError(f"true wind speed {tws_mps} is not a finite speed")
+        tws = self.tws_mps
+        if tws_mps >= tws[-1]:
+            return len(tws) - 1, 0.0
+        if tws_mps <= tws[0]:
+            return -1, tws_mps / tws[0] if tws[0] > 0.0 else 1.0
+        i = bisect.bisect_right(tws, tws_mps) - 1
+        return i, (tws_mps - tws[i]) / (tws[i + 1] - tws[i])
+
+    def speed(self, node: int, wind: tuple[int, float]) -> float:
+        """Return the speed at a node in such a wind [m/s]."""
+        at, (i, f) = node - self.first, wind
+        if at < 0:
+            return 0.0
+        row = self.rows[min(at, len(self.rows) - 1)]
+        speed = row[0] * f if i < 0 else row[i] if i + 1 == len(row) else (1.0 - f) * row[i] + f * row[i + 1]
+        return speed if at < len(self.rows) else self.shares[at - len(self.rows)] * speed
+
+
+def _lists_of(polar: Polar) -> _Lists:
+    nodes, _ = polar.curve(0.0)
+    twa = polar.twa_rad
+    return _Lists(
+        nodes=nodes.tolist(),
+        first=1 if twa[0] > 0.0 else 0,
+        shares=_beyond(float(twa[-1]))[1].tolist() if twa[-1] < math.pi else [],
+        tws_mps=polar.tws_mps.tolist(),
+        rows=polar.speed_mps_table.tolist(),
+    )
 
 
 def _beyond(last_rad: float) -> tuple[Floats, Floats]:

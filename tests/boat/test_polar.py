@@ -26,6 +26,34 @@ def test_beyond_its_last_angle_gybing_at_that_angle_makes_more(last_deg):
     assert polar.speed_mps(twa[-1] + 0.01, 5.0) == pytest.approx(2.0, abs=0.25)
 
 
+@pytest.mark.parametrize(
+    "polar",
+    [
+        *POLARS,
+        Polar(
+            twa_rad=np.radians([30.0, 90.0, 150.0]),
+            tws_mps=np.array([2.0, 5.0, 9.0]),
+            speed_mps_table=np.array([[0.3, 1.1, 1.7], [0.9, 2.3, 2.9], [0.7, 1.9, 2.7]]),
+        ),
+    ],
+    ids=lambda p: p.name or "with ends",
+)
+@given(twa=ANGLES, tws=WINDS)
+def test_one_speed_is_what_the_whole_curve_says_to_the_last_bit(polar, twa, tws):
+    folded = abs((twa + math.pi) % (2.0 * math.pi) - math.pi)
+    assert polar.speed_mps(twa, tws) == float(np.interp(folded, *polar.curve(tws)))
+
+
+def test_one_speed_needs_no_whole_curve(monkeypatch):
+    """A step asks for fifty, each in a wind of its own: it was a tenth of a voyage under the virtual clock."""
+    polar, made = avalon(), []
+    real = Polar.curve
+    monkeypatch.setattr(Polar, "curve", lambda self, tws: made.append(tws) or real(self, tws))
+    for n in range(50):
+        polar.speed_mps(1.0, 0.1 * n)
+    assert len(made) <= 1
+
+
 @pytest.mark.parametrize("polar", POLARS, ids=lambda p: p.name)
 @given(twa=ANGLES, tws=WINDS)
 @settings(max_examples=60)
