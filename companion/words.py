@@ -141,12 +141,12 @@ def time_words(seconds: float) -> str:
 
 
 def brief_time(seconds: float) -> str:
-    """Return a time span where there is no room for words.
+    """Return a time span where there is no room for words, to the nearest second.
 
-    >>> brief_time(42.0), brief_time(100.0), brief_time(5000.0)
+    >>> brief_time(42.0), brief_time(99.6), brief_time(5000.0)
     ('42 s', '1:40', '1 h 23')
     """
-    whole = int(max(0.0, seconds))
+    whole = round(max(0.0, seconds))
     if whole < 60:
         return f"{whole} s"
     return f"{whole // 60}:{whole % 60:02d}" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02d}"

@@ -13,7 +13,7 @@ from typing import Any
 from companion.geo.angles import direction
 from companion.orders import Verb
 from companion.program.arguments import number, radio_options
-from companion.words import counted
+from companion.words import brief_time, counted
 
 EXIT_NO_LINK, EXIT_STALE, EXIT_ALARM = 3, 4, 5
 # States of the skipper that somebody ashore should look at.
@@ -290,7 +290,7 @@ def _write_text(d: dict[str, Any], units: str) -> None:
         if pilot["mode"] is None
         else f"{pilot['mode']} {'ARMED' if pilot['armed'] else 'disarmed'}"
     )
-    tack = "-" if w["next_tack_s"] is None else f"about {show(w['next_tack_s'])} s"
+    tack = "-" if w["next_tack_s"] is None else f"about {brief_time(w['next_tack_s'])}"
     replans = "- replans" if plan["replans"] is None else counted(plan["replans"], "replan")
     safe = None if plan["promised_risk"] is None else 1.0 - plan["promised_risk"]
     print(f"{state}  {helm}  (age {d['age_s']:.1f} s)  {d['alert']['text']}")

@@ -18,6 +18,7 @@ from companion.messages import CompanionStatus, Mode, Severity
 from companion.orders import Verb
 from companion.skipper import Skipper
 from companion.skipper.planning import next_tack
+from companion.skipper.planning.next_tack import NextTack
 from companion.skipper.step import Phase, is_off_plan
 from companion.skipper.step.actions import Announce
 from companion.skipper.step.config import Guidance, SkipperConfig
@@ -140,6 +141,12 @@ def test_no_distance_off_the_leg_has_no_side(off_m, told):
     world.run(5)
     step = Step(snapshot=world.snapshot(), state=world.state, actions=(), voyage=world.skipper.voyage)
     assert told in progress_text(step)
+
+
+def test_the_next_tack_is_told_as_arrival_is():
+    """ "next tack about 101 s" stood beside "there in 3:22"."""
+    assert NextTack(in_s=101.2, is_planned=False).words == "about 1:41"
+    assert NextTack(in_s=59.7, is_planned=True).words == "1:00"
 
 
 def test_held_in_a_loiter_no_tack_comes_and_the_way_to_the_circles_middle_is_none_to_the_waypoint():

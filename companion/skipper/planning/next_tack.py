@@ -10,6 +10,7 @@ from companion.geo.angles import difference_rad, heading_of
 from companion.messages import Command, Mode
 from companion.skipper.step import Phase, SkipperState, Snapshot
 from companion.skipper.way import PointEn, along_m, cross_track_m, moved
+from companion.words import brief_time
 
 # A tack takes this long: who should have tacked a moment ago is tacking [s].
 TACKING_S = 4.0
@@ -77,7 +78,7 @@ class NextTack(NamedTuple):
     @property
     def words(self) -> str:
         """When it is, as console and radio tell it."""
-        return f"{'' if self.is_planned else 'about '}{self.in_s:.0f} s"
+        return f"{'' if self.is_planned else 'about '}{brief_time(self.in_s)}"
 
 
 def next_tack_s(seen: Seen, boat: Boat) -> float | None:
