@@ -29,6 +29,7 @@ TURNED_RAD = math.radians(15.0)  # towards it, since it was settled
 ABORTED_S = 5.0  # back sooner, the boat was told otherwise: an upload has begun its leg anew ...
 STOPPED = 0.4  # ... unless its speed fell to less than this share: in a tack it falls to half
 LIES_S = 8.0  # as the watchdog "in irons" has it
+AGAIN_S = 12.0  # longer after that no single failure lies: it fell off for a moment, and what it tried failed again
 FORGET_S = 20.0  # settled longer ago than this, whatever follows is no tack from there
 LEAST_TWS_MPS = 1.5  # in less the boat does as it likes
 NEAR_SOLID_M = 60.0  # a tack that failed so near something asks for a new plan
@@ -67,6 +68,8 @@ def followed(now: Tacking, t_s: float, heading_rad: float, twd_from_rad: float, 
     fresh = now.side != 0 and t_s - now.settled_s <= FORGET_S
     if now.began_s is not None and not now.is_counted and t_s - now.began_s >= LIES_S and abs(off) < SETTLED_RAD:
         now = _counted(replace(now, is_counted=True, settled_s=t_s), t_s, failed=True)
+    elif now.is_counted and t_s - now.failed_s >= AGAIN_S and abs(off) < SETTLED_RAD:
+        now = _counted(now, t_s, failed=True)
     # Yawing in a sea the boat is beyond that angle for a moment while it lies, and settled on no tack.
     lies = now.began_s is not None and speed_mps < STOPPED * now.settled_mps and side == now.side
     if abs(off) >= SETTLED_RAD and not lies:

@@ -167,3 +167,10 @@ def test_a_yaw_beyond_30_degrees_while_she_lies_is_no_end_of_it():
     for side in (1, -1):
         now = seen([side * h for h in headings], speeds_mps=speeds)
         assert (now.tried, now.failed) == (1, 1)
+
+
+@pytest.mark.parametrize(("lain_s", "failed"), [(19, 1), (20, 2), (32, 3)])
+def test_who_lies_on_without_ever_being_settled_has_failed_again(lain_s, failed):
+    now = seen([45, 45] + [12, 14, 13, 25] * 12, speeds_mps=[2.0, 2.0] + [0.3] * 48)
+    assert seen(([45, 45] + [12, 14, 13, 25] * 12)[: lain_s + 3], speeds_mps=[2.0, 2.0] + [0.3] * 48).failed == failed
+    assert now.in_a_row == now.failed
