@@ -1,6 +1,6 @@
 // The editor: a sketch, what is found in it and what a plan would be; saved and exported by the program that serves it.
 import * as chart from "./chart.js";
-import { el, get, set, table } from "./dom.js";
+import { el, get, renew, set, table } from "./dom.js";
 import { bearing, distance, duration, percent, speedUnit, units } from "./format.js";
 import * as map from "./map.js";
 import { called, degrees, History, middle, placeOf, places, removed, ringEn, toEn } from "./sketch.js";
@@ -181,7 +181,7 @@ function planWords() {
   words.classList.toggle("warn", Boolean(plan?.error) && history.now.goals.length > 0);
   const facts = plan === null || legs.length === 0 ? [] : [["time", duration(plan.time_s)], ["way", distance(plan.length_m)], ["tacks, gybes", `${plan.tacks}, ${plan.gybes}`], ["beyond the margin", distance(plan.clearance_m)], ...(legs.length === 1 ? [["off the plan", percent(legs[0]?.risk)]] : [])];
   get("planfacts").replaceChildren(...facts.map(([name, value]) => el("div", {}, el("dt", {}, name ?? ""), el("dd", {}, value ?? ""))));
-  get("plantable").replaceChildren(...(plan && legs.length > 1 ? [table("Legs", ["to", "time", "nine of ten", "way", "tacks", "off plan"], legs.map((leg) => [leg.to, duration(leg.time_s), duration(leg.late_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []));
+  renew(get("plantable"), plan && legs.length > 1 ? [table("Legs", ["to", "time", "nine of ten", "way", "tacks", "off plan"], legs.map((leg) => [leg.to, duration(leg.time_s), duration(leg.late_s), distance(leg.length_m), String(leg.tacks), percent(leg.risk)]))] : []);
   const first = legs[0]?.why;
   if (plan && !plan.error && first && legs.length === 1) words.textContent = first;
   /** @type {Point[]} */ const way = [];

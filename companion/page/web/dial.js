@@ -1,5 +1,5 @@
 // The wind dial: the boat's bow up, the wind on it, where she cannot sail now and later, the laylines, the shifts lately.
-import { picture, svg } from "./dom.js";
+import { picture, renew, set, sketch } from "./dom.js";
 import { bearing, bearingUnit, NONE, speed, speedUnit, units } from "./format.js";
 import { onDial, path, sector, wrap } from "./geometry.js";
 
@@ -13,40 +13,40 @@ export function show(view, past) {
   const heading = view?.boat.heading_deg ?? null;
   const up = heading ?? 0;
   const off = units.bearings === "magnetic" ? units.variation : 0;
-  /** @type {SVGElement[]} */
-  const out = [svg("circle", { r: RIM, class: "rim" }), svg("circle", { r: FACE, class: "face" })];
+  /** @type {import("./dom.js").Sketch[]} */
+  const out = [sketch("circle", { r: RIM, class: "rim" }), sketch("circle", { r: FACE, class: "face" })];
   const zone = view?.no_go;
   if (zone) [...zone.wedges].reverse().forEach((one, n) => {
     const k = zone.wedges.length - 1 - n;
-    out.push(svg("path", { class: `zone z${k}`, d: sector(one.from_deg - one.half_deg - up, one.from_deg + one.half_deg - up, 0, FACE - 22 + 11 * k) }));
+    out.push(sketch("path", { class: `zone z${k}`, d: sector(one.from_deg - one.half_deg - up, one.from_deg + one.half_deg - up, 0, FACE - 22 + 11 * k) }));
   });
   const lay = view?.laylines;
   if (lay) for (const line of lay.lines) {
     const at = line.course_deg - up;
-    out.push(svg("path", { class: `swing ${line.tack}`, d: sector(at - line.swing_deg, at + line.swing_deg, FACE - 10, FACE) }),
-      svg("path", { class: `lay ${line.tack}`, d: path([onDial(at, 34), onDial(at, FACE)]) }));
+    out.push(sketch("path", { class: `swing ${line.tack}`, d: sector(at - line.swing_deg, at + line.swing_deg, FACE - 10, FACE) }),
+      sketch("path", { class: `lay ${line.tack}`, d: path([onDial(at, 34), onDial(at, FACE)]) }));
   }
   for (let degrees = 0; degrees < 360; degrees += 10) {
     const at = degrees + off - up, is = degrees % 30 === 0;
-    out.push(svg("path", { class: is ? "tick major" : "tick", d: path([onDial(at, RIM), onDial(at, RIM - (is ? 9 : 5))]) }));
+    out.push(sketch("path", { class: is ? "tick major" : "tick", d: path([onDial(at, RIM), onDial(at, RIM - (is ? 9 : 5))]) }));
     if (is) {
       const [x, y] = onDial(at, RIM - 17);
-      out.push(svg("text", { x, y: y + 4, class: degrees % 90 ? "rose" : "rose main" }, { 0: "N", 90: "E", 180: "S", 270: "W" }[degrees] ?? String(degrees)));
+      out.push(sketch("text", { x, y: y + 4, class: degrees % 90 ? "rose" : "rose main" }, { 0: "N", 90: "E", 180: "S", 270: "W" }[degrees] ?? String(degrees)));
     }
   }
   out.push(...shifts(view, past, up));
   const goal = view?.goals.find((g) => g.is_next);
   if (goal && goal.bearing_deg !== null) {
     const [x, y] = onDial(goal.bearing_deg - up, RIM + 7);
-    out.push(svg("circle", { cx: x, cy: y, r: 5.5, class: "mark" }), svg("title", {}, `to ${goal.name}`));
+    out.push(sketch("circle", { cx: x, cy: y, r: 5.5, class: "mark" }), sketch("title", {}, `to ${goal.name}`));
   }
   const cog = view?.boat.cog_deg ?? null;
   if (cog !== null && (view?.boat.sog_mps ?? 0) > 0.2) {
     const [x, y] = onDial(cog - up, FACE - 2);
-    out.push(svg("path", { class: "cog", d: "M0-8L6 0L0 8L-6 0Z", transform: `translate(${x.toFixed(1)} ${y.toFixed(1)}) rotate(${cog - up})` }));
+    out.push(sketch("path", { class: "cog", d: "M0-8L6 0L0 8L-6 0Z", transform: `translate(${x.toFixed(1)} ${y.toFixed(1)}) rotate(${cog - up})` }));
   }
   if (heading !== null) {
-    out.push(svg("path", { class: "hull", d: "M0-44C14-22 15 10 10 34H-10C-15 10-14-22 0-44Z" }), svg("path", { class: "lubber", d: `M0 ${-RIM - 10}l-6-9h12z` }));
+    out.push(sketch("path", { class: "hull", d: "M0-44C14-22 15 10 10 34H-10C-15 10-14-22 0-44Z" }), sketch("path", { class: "lubber", d: `M0 ${-RIM - 10}l-6-9h12z` }));
   }
   const wind = view?.wind;
   if (wind) {
@@ -55,22 +55,22 @@ export function show(view, past) {
   }
   out.push(...corner(-166, -152, "start", "TWD", bearing(wind?.twd_from_deg), bearingUnit()), ...corner(166, -152, "end", `TWS ${speedUnit()}`, speed(wind?.tws_mps), ""),
     ...corner(-166, 152, "start", "HDG", bearing(heading), bearingUnit()), ...corner(166, 152, "end", `SOG ${speedUnit()}`, speed(view?.boat.sog_mps), ""));
-  root.replaceChildren(...out);
-  root.setAttribute("aria-label", `Wind dial: true wind from ${bearing(wind?.twd_from_deg)}, ${speed(wind?.tws_mps)} ${speedUnit()}, heading ${bearing(heading)}`);
+  renew(root, out);
+  set(root, { "aria-label": `Wind dial: true wind from ${bearing(wind?.twd_from_deg)}, ${speed(wind?.tws_mps)} ${speedUnit()}, heading ${bearing(heading)}` });
 }
 
 /** @param {number} at @param {string} letter @param {string} kind @param {number} radius */
 function arrow(at, letter, kind, radius) {
-  return svg("g", { class: `arrow ${kind}`, transform: `rotate(${at.toFixed(1)})` },
-    svg("path", { d: `M0 ${-radius + 34}L-11 ${-radius}L0 ${-radius + 8}L11 ${-radius}Z` }),
-    svg("text", { x: 0, y: -radius + 19, transform: `rotate(${(-at).toFixed(1)} 0 ${-radius + 15})` }, letter));
+  return sketch("g", { class: `arrow ${kind}`, transform: `rotate(${at.toFixed(1)})` },
+    sketch("path", { d: `M0 ${-radius + 34}L-11 ${-radius}L0 ${-radius + 8}L11 ${-radius}Z` }),
+    sketch("text", { x: 0, y: -radius + 19, transform: `rotate(${(-at).toFixed(1)} 0 ${-radius + 15})` }, letter));
 }
 
 /** @param {number} x @param {number} y @param {string} anchor @param {string} name @param {string} value @param {string} unit */
 function corner(x, y, anchor, name, value, unit) {
   const top = y < 0;
-  return [svg("text", { x, y: top ? y - 4 : y + 14, class: "cornername", "text-anchor": anchor }, name),
-    svg("text", { x, y: top ? y + 20 : y - 3, class: "cornervalue", "text-anchor": anchor }, value + (unit && value !== NONE ? ` ${unit}` : ""))];
+  return [sketch("text", { x, y: top ? y - 4 : y + 14, class: "cornername", "text-anchor": anchor }, name),
+    sketch("text", { x, y: top ? y + 20 : y - 3, class: "cornervalue", "text-anchor": anchor }, value + (unit && value !== NONE ? ` ${unit}` : ""))];
 }
 
 /** Where the wind was lately: dots that fade, and the arc between its limits. @param {View | null} view @param {Past | null} past @param {number} up */
@@ -87,8 +87,8 @@ function shifts(view, past, up) {
     high = Math.max(high, off);
     if (n % 6 === 0) {
       const [x, y] = onDial(twd - up, RIM + 2);
-      dots.push(svg("circle", { cx: x, cy: y, r: 1.6, class: "shift", opacity: (1 - 0.85 * ago / LATELY_S).toFixed(2) }));
+      dots.push(sketch("circle", { cx: x, cy: y, r: 1.6, class: "shift", opacity: (1 - 0.85 * ago / LATELY_S).toFixed(2) }));
     }
   }
-  return [svg("path", { class: "limits", d: sector(middle + low - up, middle + high - up, RIM, RIM + 4) }), ...dots];
+  return [sketch("path", { class: "limits", d: sector(middle + low - up, middle + high - up, RIM, RIM + 4) }), ...dots];
 }

@@ -1,7 +1,7 @@
 // The chart: own water first. Metres on a local frame; symbols and words stay upright and of one size.
 import * as charts from "./charts.js";
 import * as passage from "./passage.js";
-import { get, picture, set, svg } from "./dom.js";
+import { get, picture, renew, set, sketch, svg } from "./dom.js";
 import { bearing, distance, drying, duration, percent } from "./format.js";
 import { byTack, matrix, moved, path, project, riskClass, scaleBar, unproject } from "./geometry.js";
 
@@ -190,7 +190,7 @@ function water() {
     const rings = pictures.flat(2), before = shown[name] ?? [];
     if (rings.length === before.length && rings.every((one, n) => one === before[n]) && layers[name]?.children.length === pictures.length) return;
     shown[name] = rings;
-    fill(name, pictures.map((shapes) => svg("path", { d: shapes.flat().map(ring).join(""), "fill-rule": "evenodd" })));
+    fill(name, pictures.map((shapes) => sketch("path", { d: shapes.flat().map(ring).join(""), "fill-rule": "evenodd" })));
   };
   const { area } = state;
   for (const name of /** @type {const} */ (["grown", "obstacles", "limits"])) draw(name, area === null ? [] : [area[name]]);
@@ -236,9 +236,10 @@ function draw() {
   if (drawing.over) layers.drawing?.replaceChildren(...drawing.over(at, camera));
 }
 
-/** @param {string} name @param {SVGElement[]} children */
+/** @param {string} name @param {import("./dom.js").Sketch[]} children */
 function fill(name, children) {
-  layers[name]?.replaceChildren(...children);
+  const layer = layers[name];
+  if (layer) renew(layer, children);
 }
 
 /** @param {(en: Point) => Point} at */
@@ -254,7 +255,7 @@ function grid(at) {
   for (let n = Math.ceil(Math.min(...ns) / step) * step; n <= Math.max(...ns); n += step) {
     lines.push(path([at([Math.min(...es), n]), at([Math.max(...es), n])]));
   }
-  fill("grid", [svg("path", { d: lines.join("") })]);
+  fill("grid", [sketch("path", { d: lines.join("") })]);
 }
 
 /** @type {Record<string, readonly unknown[]>} what the track in a layer was drawn of: it lies in metres, and the camera is nothing to it */
@@ -276,11 +277,11 @@ function track() {
   if (isTracked("track", [past, length, past?.t_s[0], past?.t_s[length - 1], count])) return;   // a past grows at its end, and is cut at its beginning
   if (past === null) return fill("track", []);
   const pieces = byTack(past.east_m.slice(0, count), past.north_m.slice(0, count), past.starboard.slice(0, count));
-  const children = pieces.map((piece) => svg("path", {
+  const children = pieces.map((piece) => sketch("path", {
     d: path(piece.points), class: piece.starboard === null ? "unknown" : piece.starboard ? "starboard" : "port" }));
   if (count < past.t_s.length) {
     const rest = byTack(past.east_m.slice(Math.max(0, count - 1)), past.north_m.slice(Math.max(0, count - 1)), []);
-    children.unshift(...rest.map((piece) => svg("path", { d: path(piece.points), class: "tocome" })));
+    children.unshift(...rest.map((piece) => sketch("path", { d: path(piece.points), class: "tocome" })));
   }
   fill("track", children);
 }
@@ -289,12 +290,12 @@ function track() {
 function laylines(view, at) {
   const lay = view?.laylines;
   if (!lay) return fill("lay", []);
-  /** @type {SVGElement[]} */
+  /** @type {import("./dom.js").Sketch[]} */
   const children = [];
   for (const line of lay.lines) {
     const end = (/** @type {number} */ off) => at(moved(lay.mark_en_m, line.course_deg + 180 + off, LAY_M));
-    children.push(svg("path", { class: `fan ${line.tack}`, d: path([at(lay.mark_en_m), end(-line.swing_deg), end(line.swing_deg)], true) }));
-    children.push(svg("path", { class: `line ${line.tack}`, d: path([at(lay.mark_en_m), end(0)]) }));
+    children.push(sketch("path", { class: `fan ${line.tack}`, d: path([at(lay.mark_en_m), end(-line.swing_deg), end(line.swing_deg)], true) }));
+    children.push(sketch("path", { class: `line ${line.tack}`, d: path([at(lay.mark_en_m), end(0)]) }));
   }
   fill("lay", children);
 }
@@ -304,7 +305,7 @@ function wedge(view, at) {
   const boat = view?.boat.at_en_m, zone = view?.no_go;
   if (!boat || !zone) return fill("wedge", []);
   const [x, y] = at(boat);
-  /** @type {SVGElement[]} */
+  /** @type {import("./dom.js").Sketch[]} */
   const children = [];
   [...zone.wedges].reverse().forEach((one, n) => {
     const radius = 46 + 16 * (zone.wedges.length - 1 - n);
@@ -314,7 +315,7 @@ function wedge(view, at) {
     };
     const [a, b] = [side(one.from_deg - one.half_deg), side(one.from_deg + one.half_deg)];
     const large = one.half_deg > 90 ? 1 : 0;
-    children.push(svg("path", { class: `zone z${zone.wedges.length - 1 - n}`,
+    children.push(sketch("path", { class: `zone z${zone.wedges.length - 1 - n}`,
       d: `M${x} ${y}L${a[0]} ${a[1]}A${radius} ${radius} 0 ${large} 1 ${b[0]} ${b[1]}Z` }));
   });
   fill("wedge", children);
@@ -322,27 +323,27 @@ function wedge(view, at) {
 
 /** @param {View | null} view @param {(en: Point) => Point} at */
 function plan(view, at) {
-  /** @type {SVGElement[]} */
+  /** @type {import("./dom.js").Sketch[]} */
   const children = [];
   const legs = view?.plan?.legs ?? [];
   legs.forEach((leg, n) => {
     if (leg.is_loiter) return;
     const from = n === 0 && view?.boat.at_en_m ? leg.from_en_m : leg.from_en_m;
-    children.push(svg("path", { d: path([at(from), at(leg.to_en_m)]), class: `leg r${riskClass(leg.risk)}${leg.is_beat ? " beat" : ""}` }));
+    children.push(sketch("path", { d: path([at(from), at(leg.to_en_m)]), class: `leg r${riskClass(leg.risk)}${leg.is_beat ? " beat" : ""}` }));
   });
   legs.forEach((leg, n) => {
     if (leg.is_loiter) return;
     const [x, y] = at(leg.to_en_m);
-    children.push(svg("circle", { cx: x, cy: y, r: 3, class: "waypoint" }));
+    children.push(sketch("circle", { cx: x, cy: y, r: 3, class: "waypoint" }));
     const words = [];
     const [fx, fy] = at(leg.from_en_m);
-    if (leg.manoeuvre && n > 0) children.push(svg("text", { x: fx + 7, y: fy - 6, class: "word small" }, leg.manoeuvre));
+    if (leg.manoeuvre && n > 0) children.push(sketch("text", { x: fx + 7, y: fy - 6, class: "word small" }, leg.manoeuvre));
     if (leg.risk !== null && leg.risk >= 0.02) words.push(percent(leg.risk));
     const [a, b] = [at(leg.from_en_m), at(leg.to_en_m)];
     if (words.length && Math.hypot(a[0] - b[0], a[1] - b[1]) > 45) {
       const off = 11 / Math.max(1, Math.hypot(b[0] - a[0], b[1] - a[1]));
       const right = (b[1] - a[1]) > 0 === (b[0] - a[0]) > 0;
-      children.push(svg("text", { x: (a[0] + b[0]) / 2 + off * Math.abs(b[1] - a[1]), y: (a[1] + b[1]) / 2 + (right ? -4 : 12), class: "word" }, words.join(" ")));
+      children.push(sketch("text", { x: (a[0] + b[0]) / 2 + off * Math.abs(b[1] - a[1]), y: (a[1] + b[1]) / 2 + (right ? -4 : 12), class: "word" }, words.join(" ")));
     }
   });
   fill("plan", children);
@@ -351,7 +352,7 @@ function plan(view, at) {
 /** @param {View | null} view @param {(en: Point) => Point} at */
 function expected(view, at) {
   const ahead = view?.predicted ?? [];
-  const children = [svg("path", { d: path(ahead.map((p) => at(p.at_en_m))), class: "way" })];
+  const children = [sketch("path", { d: path(ahead.map((p) => at(p.at_en_m))), class: "way" })];
   let minute = 60;
   for (let n = 1; n < ahead.length; n++) {
     const a = ahead[n - 1], b = ahead[n];
@@ -361,9 +362,9 @@ function expected(view, at) {
       const [x, y] = at([a.at_en_m[0] + f * (b.at_en_m[0] - a.at_en_m[0]), a.at_en_m[1] + f * (b.at_en_m[1] - a.at_en_m[1])]);
       if (minute === 60 && b.within_m !== null) {   // nine boats in ten are within
         const edge = at([a.at_en_m[0] + f * (b.at_en_m[0] - a.at_en_m[0]) + b.within_m, a.at_en_m[1] + f * (b.at_en_m[1] - a.at_en_m[1])]);
-        children.push(svg("circle", { cx: x, cy: y, r: Math.hypot(edge[0] - x, edge[1] - y), class: "within" }));
+        children.push(sketch("circle", { cx: x, cy: y, r: Math.hypot(edge[0] - x, edge[1] - y), class: "within" }));
       }
-      children.push(svg("circle", { cx: x, cy: y, r: 2.2, class: "minute" }), svg("text", { x: x + 5, y: y - 4, class: "word small" }, `${minute / 60}′`));
+      children.push(sketch("circle", { cx: x, cy: y, r: 2.2, class: "minute" }), sketch("text", { x: x + 5, y: y - 4, class: "word small" }, `${minute / 60}′`));
       minute += 60;
     }
   }
@@ -377,12 +378,12 @@ function previewed(at) {
   const children = [];
   for (let n = 1; n < preview.way.length; n++) {
     const a = preview.way[n - 1], b = preview.way[n];
-    if (a && b) children.push(svg("path", { d: path([at(a), at(b)]), class: `leg r${riskClass(preview.risks[n - 1])}` }));
+    if (a && b) children.push(sketch("path", { d: path([at(a), at(b)]), class: `leg r${riskClass(preview.risks[n - 1])}` }));
   }
   const end = preview.way[preview.way.length - 1];
   if (end) {
     const [x, y] = at(end);
-    children.push(svg("circle", { cx: x, cy: y, r: 9, class: "target" }), svg("path", { d: `M${x - 14} ${y}h28M${x} ${y - 14}v28`, class: "target" }));
+    children.push(sketch("circle", { cx: x, cy: y, r: 9, class: "target" }), sketch("path", { d: `M${x - 14} ${y}h28M${x} ${y - 14}v28`, class: "target" }));
   }
   fill("preview", children);
 }
@@ -409,32 +410,32 @@ function places(view, at) {
   for (const goal of view?.goals ?? []) {
     const [x, y] = at(goal.at_en_m);
     const kind = goal.is_reached ? "reached" : goal.is_next ? "next" : "later";
-    if (goal.radius_m) children.push(svg("circle", { cx: x, cy: y, r: Math.max(3, goal.radius_m * camera.scale), class: `goal ${kind}` }));
+    if (goal.radius_m) children.push(sketch("circle", { cx: x, cy: y, r: Math.max(3, goal.radius_m * camera.scale), class: `goal ${kind}` }));
     if (goal.line_en_m) {
       const [p, s] = goal.line_en_m.map(at);
-      if (p && s) children.push(svg("path", { d: path([p, s]), class: `gate ${kind}` }), svg("circle", { cx: p[0], cy: p[1], r: 4, class: "mark port" }), svg("circle", { cx: s[0], cy: s[1], r: 4, class: "mark starboard" }));
+      if (p && s) children.push(sketch("path", { d: path([p, s]), class: `gate ${kind}` }), sketch("circle", { cx: p[0], cy: p[1], r: 4, class: "mark port" }), sketch("circle", { cx: s[0], cy: s[1], r: 4, class: "mark starboard" }));
     }
-    children.push(svg("path", { d: `M${x} ${y - 6}l5 9h-10z`, class: `goal flag ${kind}` }));
+    children.push(sketch("path", { d: `M${x} ${y - 6}l5 9h-10z`, class: `goal flag ${kind}` }));
     words.push([[x + 9, y - 6], goal.name + (goal.side ? ` (${goal.side})` : ""), kind]);
   }
   for (const refuge of view?.refuges ?? []) {
     const [x, y] = at(refuge.at_en_m);
-    children.push(svg("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: "refuge" }));
+    children.push(sketch("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: "refuge" }));
     words.push([[x + 9, y + 4], refuge.name || "refuge", "refuge"]);
   }
   if (view?.home) {
     const [x, y] = at(view.home.at_en_m);
-    children.push(svg("path", { d: `M${x} ${y - 6}l6 5v6h-12v-6z`, class: "home" }));
+    children.push(sketch("path", { d: `M${x} ${y - 6}l6 5v6h-12v-6z`, class: "home" }));
     words.push([[x + 9, y + 14], "home", "home"]);
   }
   if (view?.safe_end && view.plan) {
     const [x, y] = at(view.safe_end.at_en_m);
-    children.push(svg("circle", { cx: x, cy: y, r: 7, class: "safeend" }));
+    children.push(sketch("circle", { cx: x, cy: y, r: 7, class: "safeend" }));
     if (!view.goals.some((goal) => Math.hypot(at(goal.at_en_m)[0] - x, at(goal.at_en_m)[1] - y) < 30)) words.push([[x + 9, y + 14], "safe end", "safeend"]);
   }
   if (view?.orders.standing?.at_en_m) {
     const [x, y] = at(view.orders.standing.at_en_m);
-    children.push(svg("path", { d: `M${x - 8} ${y}h16M${x} ${y - 8}v16`, class: "ordered" }));
+    children.push(sketch("path", { d: `M${x - 8} ${y}h16M${x} ${y - 8}v16`, class: "ordered" }));
     words.push([[x + 9, y + 4], "ordered", "ordered"]);
   }
   /** @type {Point[]} */
@@ -444,7 +445,7 @@ function places(view, at) {
     while (taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - line) < 12)) line += 12;
     taken.push([x, line]);
     const isCut = x + 8 * text.length > camera.width;
-    children.push(svg("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
+    children.push(sketch("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
   const land = (/** @type {string} */ name, /** @type {Point[]} */ ring, /** @type {string} */ kind) => {
     const [e, w, s, m] = extent(ring);
@@ -452,7 +453,7 @@ function places(view, at) {
     // a name that its island has room for, and nothing else is written over
     if (Math.max(e - w, m - s) * camera.scale < 24 || taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - y) < 12)) return;
     taken.push([x, y]);
-    children.push(svg("text", { x, y: y + 4, class: `word ${kind}`, "text-anchor": "middle" }, name));
+    children.push(sketch("text", { x, y: y + 4, class: `word ${kind}`, "text-anchor": "middle" }, name));
   };
   for (const water of state.area?.drying ?? []) land(`${water.name}: ${drying(water.solid_unix_s, view?.unix_s).words}`, water.shapes[0]?.[0] ?? [], "drying");
   state.area?.names?.forEach((name, n) => land(name, state.area?.obstacles[n]?.[0] ?? [], "land"));
@@ -469,17 +470,17 @@ function vessels(view, at) {
     const alarm = vessel.alarm && vessel.alarm !== "none" ? vessel.alarm : "clear";
     if (vessel.cpa_en_m && vessel.own_cpa_en_m && view?.boat.at_en_m) {
       const [a, b] = [at(vessel.cpa_en_m), at(vessel.own_cpa_en_m)];
-      children.push(svg("path", { d: path([[x, y], a]), class: "vector" }), svg("path", { d: path([at(view.boat.at_en_m), b]), class: "vector own" }),
-        svg("path", { d: path([a, b]), class: `cpa ${alarm}` }));
-      children.push(svg("circle", { cx: a[0], cy: a[1], r: 4, class: `ghost ${alarm}` }));
+      children.push(sketch("path", { d: path([[x, y], a]), class: "vector" }), sketch("path", { d: path([at(view.boat.at_en_m), b]), class: "vector own" }),
+        sketch("path", { d: path([a, b]), class: `cpa ${alarm}` }));
+      children.push(sketch("circle", { cx: a[0], cy: a[1], r: 4, class: `ghost ${alarm}` }));
     }
     const length = Math.max(16, (vessel.length_m ?? 12) * camera.scale), beam = Math.max(7, (vessel.beam_m ?? 4) * camera.scale);
     children.push(heading === null
-      ? svg("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: `vessel ${alarm}`, transform: `rotate(45 ${x} ${y})` })
-      : svg("path", { d: `M0 ${-length / 2}L${beam / 2} ${-length / 6}V${length / 2}H${-beam / 2}V${-length / 6}Z`, class: `vessel ${alarm}`, transform: `translate(${x} ${y}) rotate(${heading - camera.up})` }));
+      ? sketch("rect", { x: x - 5, y: y - 5, width: 10, height: 10, class: `vessel ${alarm}`, transform: `rotate(45 ${x} ${y})` })
+      : sketch("path", { d: `M0 ${-length / 2}L${beam / 2} ${-length / 6}V${length / 2}H${-beam / 2}V${-length / 6}Z`, class: `vessel ${alarm}`, transform: `translate(${x} ${y}) rotate(${heading - camera.up})` }));
     const cpa = vessel.cpa_s === null ? "opening" : `CPA ${distance(vessel.cpa_m)} in ${duration(vessel.cpa_s)}`;
-    children.push(svg("text", { x: x + beam / 2 + 6, y: y - 4, class: `word vesselword ${alarm}` }, vessel.name),
-      svg("text", { x: x + beam / 2 + 6, y: y + 9, class: `word small vesselword ${alarm}` }, cpa));
+    children.push(sketch("text", { x: x + beam / 2 + 6, y: y - 4, class: `word vesselword ${alarm}` }, vessel.name),
+      sketch("text", { x: x + beam / 2 + 6, y: y + 9, class: `word small vesselword ${alarm}` }, cpa));
   }
   fill("vessels", children);
 }
@@ -489,11 +490,11 @@ function beside(at) {
   const other = state.other;
   const isSame = isTracked("other", [other?.past, other?.count]);
   if (!other) { if (!isSame) fill("other", []); return fill("ghost", []); }
-  if (!isSame) fill("other", byTack(other.past.east_m.slice(0, other.count), other.past.north_m.slice(0, other.count), []).map((piece) => svg("path", { d: path(piece.points) })));
+  if (!isSame) fill("other", byTack(other.past.east_m.slice(0, other.count), other.past.north_m.slice(0, other.count), []).map((piece) => sketch("path", { d: path(piece.points) })));
   const n = other.count - 1, e = other.past.east_m[n], m = other.past.north_m[n];
   if (e == null || m == null) return fill("ghost", []);
   const [x, y] = at([e, m]);
-  fill("ghost", [svg("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", transform: `translate(${x} ${y}) rotate(${(other.past.heading_deg[n] ?? 0) - camera.up})` }), svg("text", { x: x + (x > camera.width - 110 ? -9 : 9), y: y + 12, class: "word small", "text-anchor": x > camera.width - 110 ? "end" : "start" }, `beside: ${other.name}`)]);
+  fill("ghost", [sketch("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", transform: `translate(${x} ${y}) rotate(${(other.past.heading_deg[n] ?? 0) - camera.up})` }), sketch("text", { x: x + (x > camera.width - 110 ? -9 : 9), y: y + 12, class: "word small", "text-anchor": x > camera.width - 110 ? "end" : "start" }, `beside: ${other.name}`)]);
 }
 
 /** @param {View | null} view @param {(en: Point) => Point} at */
@@ -503,12 +504,12 @@ function own(view, at) {
   const [x, y] = at(boat.at_en_m);
   const children = [];
   if (boat.cog_deg !== null && boat.sog_mps !== null && boat.sog_mps > 0.2) {
-    children.push(svg("path", { d: path([[x, y], at(moved(boat.at_en_m, boat.cog_deg, 30 * boat.sog_mps))]), class: "course" }));
+    children.push(sketch("path", { d: path([[x, y], at(moved(boat.at_en_m, boat.cog_deg, 30 * boat.sog_mps))]), class: "course" }));
   }
   const turn = boat.heading_deg ?? boat.cog_deg;
   children.push(turn === null
-    ? svg("circle", { cx: x, cy: y, r: 6, class: "hull" })
-    : svg("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", class: "hull", transform: `translate(${x} ${y}) rotate(${turn - camera.up})` }));
+    ? sketch("circle", { cx: x, cy: y, r: 6, class: "hull" })
+    : sketch("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", class: "hull", transform: `translate(${x} ${y}) rotate(${turn - camera.up})` }));
   fill("boat", children);
 }
 
@@ -517,14 +518,14 @@ function furniture(view, wind) {
   const bar = scaleBar(camera.scale, Math.min(170, camera.width / 3));
   const x = 14, y = camera.height - 16;
   const children = [
-    svg("path", { d: `M${x} ${y - 5}v5h${bar.pixels}v-5`, class: "scale" }),
-    svg("text", { x: x + bar.pixels + 6, y: y + 2, class: "word" }, distance(bar.metres).replace(".0", "")),
-    svg("g", { transform: `translate(${camera.width - 30} 34) rotate(${-camera.up})`, class: "north" },
-      svg("path", { d: "M0-18L5 6L0 2L-5 6Z" }), svg("text", { x: 0, y: 19, "text-anchor": "middle", transform: `rotate(${camera.up} 0 15)` }, "N")),
+    sketch("path", { d: `M${x} ${y - 5}v5h${bar.pixels}v-5`, class: "scale" }),
+    sketch("text", { x: x + bar.pixels + 6, y: y + 2, class: "word" }, distance(bar.metres).replace(".0", "")),
+    sketch("g", { transform: `translate(${camera.width - 30} 34) rotate(${-camera.up})`, class: "north" },
+      sketch("path", { d: "M0-18L5 6L0 2L-5 6Z" }), sketch("text", { x: 0, y: 19, "text-anchor": "middle", transform: `rotate(${camera.up} 0 15)` }, "N")),
   ];
   if (wind !== null) {
-    children.push(svg("g", { transform: `translate(${camera.width - 72} 34) rotate(${wind - camera.up})`, class: "windarrow" }, svg("path", { d: "M0 18V-10M-5 8L0 18L5 8" })),
-      svg("text", { x: camera.width - 72, y: 68, "text-anchor": "middle", class: "word wind" }, view?.wind?.mean_twd_from_deg == null ? bearing(wind) : `mean ${bearing(view.wind.mean_twd_from_deg)}`));
+    children.push(sketch("g", { transform: `translate(${camera.width - 72} 34) rotate(${wind - camera.up})`, class: "windarrow" }, sketch("path", { d: "M0 18V-10M-5 8L0 18L5 8" })),
+      sketch("text", { x: camera.width - 72, y: 68, "text-anchor": "middle", class: "word wind" }, view?.wind?.mean_twd_from_deg == null ? bearing(wind) : `mean ${bearing(view.wind.mean_twd_from_deg)}`));
   }
   fill("furniture", children);
 }

@@ -1,5 +1,5 @@
 // The passage as it was planned ashore: route, band, isochrones, the wind and the current as she passes, where she should be now.
-import { el, get, set, svg, table } from "./dom.js";
+import { get, renew, set, sketch, svg, table } from "./dom.js";
 import { bearing, distance, NONE, speed, speedUnit } from "./format.js";
 import { path } from "./geometry.js";
 
@@ -157,12 +157,12 @@ export function draw(view, chart) {
   const { passage, world, signs } = state;
   if (!world || !signs) return;
   set(world, { visibility: state.isShown ? null : "hidden" });
-  if (passage === null || !state.isShown) return signs.replaceChildren();
+  if (passage === null || !state.isShown) return renew(signs, []);
   /** @type {Point[]} */
   const taken = [];
   const isFree = (/** @type {Point} */ p, /** @type {number} */ px) => isSeen(p, chart.camera) && !taken.some((q) => Math.hypot(p[0] - q[0], p[1] - q[1]) < px);
-  signs.replaceChildren(...now(passage, view, chart), ...waypoints(passage, chart), ...weather(passage, chart, isFree, taken),
-    ...hours(passage, chart, isFree, taken), ...ends(passage, chart));
+  renew(signs, [...now(passage, view, chart), ...waypoints(passage, chart), ...weather(passage, chart, isFree, taken),
+    ...hours(passage, chart, isFree, taken), ...ends(passage, chart)]);
 }
 
 /** @param {Point} p @param {Camera} camera */
@@ -176,43 +176,43 @@ function now(passage, view, chart) {
   const since = view.unix_s - passage.departs_unix_s, middle = valueAt(passage.at_s, passage.middle_m, since);
   if (since < 0 || since > (passage.at_s[passage.at_s.length - 1] ?? 0)) return [];
   const members = membersAt(passage, since);
-  const out = members.map((way) => { const [cx, cy] = chart.at(placeAt(passage, way)); return svg("circle", { cx, cy, r: 3, class: "pmember" }); });
+  const out = members.map((way) => { const [cx, cy] = chart.at(placeAt(passage, way)); return sketch("circle", { cx, cy, r: 3, class: "pmember" }); });
   if (middle === null) return out;
   const [x, y] = chart.at(placeAt(passage, middle));
-  return [...out, svg("path", { d: `M${x} ${y - 7}l7 7l-7 7l-7 -7z`, class: "pnow" }), svg("text", { x: x + 10, y: y + 16, class: "word pword" }, "should be")];
+  return [...out, sketch("path", { d: `M${x} ${y - 7}l7 7l-7 7l-7 -7z`, class: "pnow" }), sketch("text", { x: x + 10, y: y + 16, class: "word pword" }, "should be")];
 }
 
 /** @param {Passage} passage @param {Chart} chart */
 function waypoints(passage, chart) {
-  /** @type {SVGElement[]} */
+  /** @type {import("./dom.js").Sketch[]} */
   const out = [];
   /** @type {Point[]} */
   const taken = [];
   for (const point of passage.waypoints) {
     const [x, y] = chart.at(point.at_en_m);
     if (!isSeen([x, y], chart.camera)) continue;
-    out.push(svg("circle", { cx: x, cy: y, r: 3.5, class: "ppoint" }));
+    out.push(sketch("circle", { cx: x, cy: y, r: 3.5, class: "ppoint" }));
     if (taken.some(([a, b]) => Math.abs(a - x) < 110 && Math.abs(b - y) < 14)) continue;
     taken.push([x, y]);
     const isCut = x > chart.camera.width - 80;
-    if (point.middle_s !== null) out.push(svg("text", { x: isCut ? x - 7 : x + 7, y: y + 28, class: "word small pword", "text-anchor": isCut ? "end" : "start" }, when(passage.departs_unix_s + point.middle_s)));
+    if (point.middle_s !== null) out.push(sketch("text", { x: isCut ? x - 7 : x + 7, y: y + 28, class: "word small pword", "text-anchor": isCut ? "end" : "start" }, when(passage.departs_unix_s + point.middle_s)));
   }
   return out;
 }
 
 /** @param {Passage} passage @param {Chart} chart @param {(p: Point, px: number) => boolean} isFree @param {Point[]} taken */
 function weather(passage, chart, isFree, taken) {
-  /** @type {SVGElement[]} */
+  /** @type {import("./dom.js").Sketch[]} */
   const out = [];
   for (const one of passage.met) {
     const at = chart.at(one.at_en_m);
     if (!isFree(at, FREE_PX)) continue;
     taken.push(at);
     const turn = one.wind_from_deg + one.north_deg - chart.camera.up;
-    out.push(svg("path", { class: "pbarb", d: barb(one.wind_mps, chart.isSouth ? -1 : 1), transform: `translate(${at[0].toFixed(1)} ${at[1].toFixed(1)}) rotate(${turn.toFixed(1)})` }));
+    out.push(sketch("path", { class: "pbarb", d: barb(one.wind_mps, chart.isSouth ? -1 : 1), transform: `translate(${at[0].toFixed(1)} ${at[1].toFixed(1)}) rotate(${turn.toFixed(1)})` }));
     if (one.current_towards_deg !== null && one.current_mps !== null && one.current_mps >= 0.05) {
       const long = Math.min(34, 12 + 16 * one.current_mps), set_deg = one.current_towards_deg + one.north_deg - chart.camera.up;
-      out.push(svg("path", { class: "pflow", d: `M0 0V${-long}M-4 ${-long + 6}L0 ${-long}L4 ${-long + 6}`, transform: `translate(${at[0].toFixed(1)} ${at[1].toFixed(1)}) rotate(${set_deg.toFixed(1)})` }));
+      out.push(sketch("path", { class: "pflow", d: `M0 0V${-long}M-4 ${-long + 6}L0 ${-long}L4 ${-long + 6}`, transform: `translate(${at[0].toFixed(1)} ${at[1].toFixed(1)}) rotate(${set_deg.toFixed(1)})` }));
     }
   }
   return out;
@@ -231,14 +231,14 @@ function barb(mps, side) {
 
 /** @param {Passage} passage @param {Chart} chart @param {(p: Point, px: number) => boolean} isFree @param {Point[]} taken */
 function hours(passage, chart, isFree, taken) {
-  /** @type {SVGElement[]} */
+  /** @type {import("./dom.js").Sketch[]} */
   const out = [];
   for (const one of passage.isochrones) for (const line of one.lines.slice(0, 1)) for (const share of [0.5, 0.25, 0.75]) {
     const place = line[Math.floor(share * (line.length - 1))];
     const at = place ? chart.at(place) : null;
     if (at === null || !isFree(at, 26)) continue;
     taken.push(at);
-    out.push(svg("text", { x: at[0], y: at[1] + 4, class: "word small", "text-anchor": "middle" }, `${one.hours} h`));
+    out.push(sketch("text", { x: at[0], y: at[1] + 4, class: "word small", "text-anchor": "middle" }, `${one.hours} h`));
     break;
   }
   return out;
@@ -248,7 +248,7 @@ function hours(passage, chart, isFree, taken) {
 function ends(passage, chart) {
   return passage.ends.flatMap((end) => {
     const [x, y] = chart.at(end.at_en_m);
-    return isSeen([x, y], chart.camera) ? [svg("path", { d: `M${x - 5} ${y - 5}l10 10M${x - 5} ${y + 5}l10 -10`, class: "pend" }), svg("text", { x: x + 8, y: y - 7, class: "word small pword" }, `${end.runs} of ${passage.runs} runs end`)] : [];
+    return isSeen([x, y], chart.camera) ? [sketch("path", { d: `M${x - 5} ${y - 5}l10 10M${x - 5} ${y + 5}l10 -10`, class: "pend" }), sketch("text", { x: x + 8, y: y - 7, class: "word small pword" }, `${end.runs} of ${passage.runs} runs end`)] : [];
   });
 }
 
@@ -267,7 +267,7 @@ export function say(view) {
   if (key === state.said) return;
   state.said = key;
   get("passagewords").textContent = said;
-  get("passagebox").replaceChildren(...numbers(passage));
+  renew(get("passagebox"), numbers(passage));
 }
 
 /** Wind and current at a place; null: the forecast knew none there. @param {Passage} passage @param {Point} en */
@@ -289,7 +289,7 @@ function numbers(passage) {
     return [point.name, at(point.middle_s), range, wind, flow, distance(point.band_m)];
   });
   return [table(`Passage: ${passage.name || "planned"}`, ["waypoint", "UTC, middle", share ? `${share} between` : "one run only", `wind, ${speedUnit()}`, `current to, ${speedUnit()}`, "band"], rows),
-    ...histogram(passage), el("ul", { class: "psaid" }, ...[...passage.said, ...passage.binds].map((line) => el("li", {}, line)), ...passage.ends.map((end) => el("li", {}, `${end.runs} of ${passage.runs} runs end: ${end.why}`)))];
+    ...histogram(passage), sketch("ul", { class: "psaid" }, ...[...passage.said, ...passage.binds].map((line) => sketch("li", {}, line)), ...passage.ends.map((end) => sketch("li", {}, `${end.runs} of ${passage.runs} runs end: ${end.why}`)))];
 }
 
 /** When all runs arrive. @param {Passage} passage */
@@ -302,8 +302,8 @@ function histogram(passage) {
   for (const one of all) { const n = Math.min(count - 1, Math.floor((one - low) / wide)); bins[n] = (bins[n] ?? 0) + 1; }
   const most = Math.max(...bins), x = (/** @type {number} */ n) => 4 + 312 * n / count;
   const words = `${when(passage.departs_unix_s + low)} to ${when(passage.departs_unix_s + high)} UTC`;
-  return [svg("svg", { viewBox: "0 0 320 74", class: "phist", role: "img", "aria-label": `When the runs arrive: ${words}` },
-    ...bins.map((n, k) => svg("rect", { x: x(k), y: 50 - 46 * n / most, width: 312 / count - 1, height: 46 * n / most })), svg("path", { d: "M4 50H316", class: "tick" }),
-    svg("text", { x: 4, y: 66, class: "axis" }, when(passage.departs_unix_s + low)), svg("text", { x: 316, y: 66, class: "axis end" }, when(passage.departs_unix_s + high)),
-    svg("text", { x: 160, y: 66, class: "axis middle" }, `arrivals of ${passage.arrived < passage.runs ? `${passage.arrived} of ` : ""}${passage.runs} runs`))];
+  return [sketch("svg", { viewBox: "0 0 320 74", class: "phist", role: "img", "aria-label": `When the runs arrive: ${words}` },
+    ...bins.map((n, k) => sketch("rect", { x: x(k), y: 50 - 46 * n / most, width: 312 / count - 1, height: 46 * n / most })), sketch("path", { d: "M4 50H316", class: "tick" }),
+    sketch("text", { x: 4, y: 66, class: "axis" }, when(passage.departs_unix_s + low)), sketch("text", { x: 316, y: 66, class: "axis end" }, when(passage.departs_unix_s + high)),
+    sketch("text", { x: 160, y: 66, class: "axis middle" }, `arrivals of ${passage.arrived < passage.runs ? `${passage.arrived} of ` : ""}${passage.runs} runs`))];
 }

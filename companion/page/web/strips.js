@@ -1,5 +1,5 @@
 // Histories: direction, strength, speed, clearance; with what was forecast a minute before, and what is forecast now.
-import { picture, svg } from "./dom.js";
+import { picture, renew, set, sketch } from "./dom.js";
 import { bearing, clock, distance, scaled, speed, speedUnit } from "./format.js";
 import { minutes, path, scale, unwrapped, wrap } from "./geometry.js";
 
@@ -10,6 +10,9 @@ const LEFT = 58, RIGHT = 64, TALL = 92, GAP = 10, TOP = 6, FOOT = 20;
 const AHEAD_S = 60;
 const root = picture("stripchart");
 let windowS = 600;
+let wide = 0;     // px; to ask for it while a view is drawn would lay the page out twice
+let again = () => {};
+new ResizeObserver(() => { if (wide !== root.clientWidth) { wide = root.clientWidth; again(); } }).observe(root);
 
 /** @param {number} seconds */
 export function over(seconds) {
@@ -18,11 +21,12 @@ export function over(seconds) {
 
 /** @param {View | null} view @param {Past | null} past @param {number | null} margin @param {{past: Past, off: number, count: number} | null} [other] */
 export function show(view, past, margin, other = null) {
-  const width = Math.max(280, root.clientWidth || 600);
+  again = () => show(view, past, margin, other);
+  const width = Math.max(280, (wide ||= root.clientWidth) || 600);
   const height = TOP + 4 * (TALL + GAP) + FOOT;
-  root.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  set(root, { viewBox: `0 0 ${width} ${height}` });
   root.style.height = `${height}px`;
-  if (!view || !past || past.t_s.length === 0) return root.replaceChildren();
+  if (!view || !past || past.t_s.length === 0) return renew(root, []);
   const now = view.t_s;
   const begin = Math.max(past.t_s[0] ?? 0, now - windowS);
   const ahead = Math.min(300, Math.max(60, 0.18 * (now - begin)));
@@ -36,8 +40,8 @@ export function show(view, past, margin, other = null) {
   const children = [];
   const bottom = TOP + 4 * (TALL + GAP) - GAP;
   for (const at of minutes(begin, end, Math.max(2, Math.floor(width / 130)), past.unix_s)) {
-    children.push(svg("path", { class: "grid", d: path([[x(at), TOP], [x(at), bottom]]) }),
-      svg("text", { x: x(at), y: bottom + 15, class: "axis middle" }, past.unix_s === null ? clock(null, at) : clock(Math.round(past.unix_s + at)).slice(0, 5)));
+    children.push(sketch("path", { class: "grid", d: path([[x(at), TOP], [x(at), bottom]]) }),
+      sketch("text", { x: x(at), y: bottom + 15, class: "axis middle" }, past.unix_s === null ? clock(null, at) : clock(Math.round(past.unix_s + at)).slice(0, 5)));
   }
   for (const [n, strip] of strips(view, past, cut, now, margin).entries()) {
     if (other) {
@@ -50,8 +54,8 @@ export function show(view, past, margin, other = null) {
     }
     children.push(...draw(strip, TOP + n * (TALL + GAP), t, x, now, width, begin));
   }
-  children.push(svg("path", { class: "present", d: path([[x(now), TOP], [x(now), bottom]]) }));
-  root.replaceChildren(...children);
+  children.push(sketch("path", { class: "present", d: path([[x(now), TOP], [x(now), bottom]]) }));
+  renew(root, children);
 }
 
 /** @param {View} view @param {Past} past @param {(column: readonly any[]) => any[]} cut @param {number} now @param {number | null} margin @returns {Strip[]} */
@@ -91,12 +95,12 @@ function draw(strip, top, t, x, now, width, begin) {
   low = strip.floor !== null ? Math.max(strip.floor, low - lacks) : low - lacks;
   high += lacks;
   const y = (/** @type {number} */ v) => top + TALL - TALL * (Math.min(high, Math.max(low, v)) - low) / Math.max(1e-9, high - low);
-  /** @type {SVGElement[]} */
-  const out = [svg("rect", { x: LEFT, y: top, width: right - LEFT, height: TALL, class: "frame" })];
+  /** @type {import("./dom.js").Sketch[]} */
+  const out = [sketch("rect", { x: LEFT, y: top, width: right - LEFT, height: TALL, class: "frame" })];
   const toUnit = strip.unit === "kn" || strip.unit === "m/s" ? scaled(1) : 1;
   for (const mark of scale(low * toUnit, high * toUnit, strip.steps)) {
     const v = mark / toUnit;
-    out.push(svg("path", { class: "grid", d: path([[LEFT, y(v)], [right, y(v)]]) }), svg("text", { x: LEFT - 6, y: y(v) + 4, class: "axis end" }, strip.label(v)));
+    out.push(sketch("path", { class: "grid", d: path([[LEFT, y(v)], [right, y(v)]]) }), sketch("text", { x: LEFT - 6, y: y(v) + 4, class: "axis end" }, strip.label(v)));
   }
   // what was forecast a minute before for this moment
   /** @type {Point[]} */ const lows = [];
@@ -105,13 +109,13 @@ function draw(strip, top, t, x, now, width, begin) {
     const at = (t[n] ?? 0) + AHEAD_S, h = strip.high[n];
     if (v !== null && h !== null && h !== undefined && at >= begin && at <= now) { lows.push([x(at), y(v)]); highs.push([x(at), y(h)]); }
   });
-  if (lows.length > 1) out.push(svg("path", { class: "band", d: path([...lows, ...highs.reverse()], true) }));
+  if (lows.length > 1) out.push(sketch("path", { class: "band", d: path([...lows, ...highs.reverse()], true) }));
   const coming = strip.ahead.filter((a) => x(a[0]) <= right + 1);
   if (coming.length > 1) {
-    out.push(svg("path", { class: "coming", d: path([...coming.map((a) => /** @type {Point} */ ([x(a[0]), y(a[1])])), ...coming.reverse().map((a) => /** @type {Point} */ ([x(a[0]), y(a[2])]))], true) }));
+    out.push(sketch("path", { class: "coming", d: path([...coming.map((a) => /** @type {Point} */ ([x(a[0]), y(a[1])])), ...coming.reverse().map((a) => /** @type {Point} */ ([x(a[0]), y(a[2])]))], true) }));
   }
   if (strip.line !== null && strip.line >= low && strip.line <= high) {
-    out.push(svg("path", { class: "limit", d: path([[LEFT, y(strip.line)], [right, y(strip.line)]]) }), svg("text", { x: right - 4, y: y(strip.line) - 4, class: "axis end" }, "margin"));
+    out.push(sketch("path", { class: "limit", d: path([[LEFT, y(strip.line)], [right, y(strip.line)]]) }), sketch("text", { x: right - 4, y: y(strip.line) - 4, class: "axis end" }, "margin"));
   }
   /** @type {Point[][]} */ const pieces = [[]];
   strip.values.forEach((v, n) => {
@@ -119,8 +123,8 @@ function draw(strip, top, t, x, now, width, begin) {
     if (v === null || v === undefined || at < begin) pieces.push([]);
     else pieces[pieces.length - 1]?.push([x(at), y(v)]);
   });
-  if (strip.other.length > 1) out.push(svg("path", { class: "otherline", d: path(strip.other.map(([at, v]) => [x(at), y(v)])) }));
-  out.push(svg("path", { class: `line ${strip.name}`, d: pieces.filter((p) => p.length > 1).map((p) => path(p)).join("") }));
-  out.push(svg("text", { x: right + 8, y: top + 14, class: "stripname" }, strip.unit ? `${strip.name} ${strip.unit}` : strip.name), svg("text", { x: right + 8, y: top + 38, class: "stripvalue" }, strip.now.replace(" m", "")));
+  if (strip.other.length > 1) out.push(sketch("path", { class: "otherline", d: path(strip.other.map(([at, v]) => [x(at), y(v)])) }));
+  out.push(sketch("path", { class: `line ${strip.name}`, d: pieces.filter((p) => p.length > 1).map((p) => path(p)).join("") }));
+  out.push(sketch("text", { x: right + 8, y: top + 14, class: "stripname" }, strip.unit ? `${strip.name} ${strip.unit}` : strip.name), sketch("text", { x: right + 8, y: top + 38, class: "stripvalue" }, strip.now.replace(" m", "")));
   return out;
 }

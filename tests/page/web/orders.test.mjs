@@ -7,6 +7,7 @@ class Thing extends EventTarget {
   children = []; parent = null; open = false; textContent = ""; attributes = {}; classList = { toggle() {} };
   setAttribute(name, value) { this.attributes[name] = value; }
   removeAttribute(name) { delete this.attributes[name]; }
+  getAttribute(name) { return this.attributes[name] ?? null; }
   append(...things) { for (const one of things) { if (one instanceof Thing) one.parent = this; this.children.push(one); } }
   replaceChildren(...things) { for (const one of this.children) if (one instanceof Thing) one.parent = null; this.children = []; this.append(...things); }
   get isConnected() { return this === page.dialog || this === page.orders || Boolean(this.parent?.isConnected); }

@@ -14,17 +14,19 @@ class Element {
     this.classList = { add() {}, remove() {}, toggle() {} };
     written.elements += 1;
   }
-  append(...more) { this.children.push(...more); }
+  append(...more) { for (const one of more) if (one instanceof Element) one.above = this; this.children.push(...more); }
   prepend(...more) { this.children.unshift(...more); }
   replaceChildren(...all) { this.children = all; }
   setAttribute(name, text) { this.attributes[name] = text; written.characters += text.length; }
+  getAttribute(name) { return this.attributes[name] ?? null; }
   removeAttribute(name) { delete this.attributes[name]; }
   addEventListener(name, hear) { (this.heard[name] ??= []).push(hear); }
   querySelector() { return this.only ??= new Element(); }
   querySelectorAll() { return []; }
   getBoundingClientRect() { return PHONE; }
   get parentElement() { return this.above ??= new Element(); }
-  remove() {}
+  remove() { const all = this.parentElement.children, n = all.indexOf(this); if (n >= 0) all.splice(n, 1); }
+  replaceWith(one) { const all = this.parentElement.children; all[all.indexOf(this)] = one; one.above = this.parentElement; }
   setPointerCapture() {}
   showModal() {}
   close() {}
@@ -45,7 +47,7 @@ export function pointer(type, [clientX, clientY]) {
 /** Start the editor on what the program says; ``answers`` by path. @param {Record<string, unknown>} answers */
 export async function edit(answers) {
   const kept = { getItem: () => null, setItem() {} }, hears = { addEventListener() {} };
-  const document = { ...hears, body: new Element(), documentElement: new Element(), getElementById: element, createElement: () => new Element(), createElementNS: () => new Element(), querySelector: () => null, querySelectorAll: () => [] };
+  const document = { ...hears, body: new Element(), documentElement: new Element(), getElementById: element, createElement: () => new Element(), createElementNS: () => new Element(), createTextNode: (textContent) => Object.assign(new Element(), { textContent }), querySelector: () => null, querySelectorAll: () => [] };
   Object.assign(globalThis, {
     window: globalThis, document, ...hears, location: { hash: "#token", pathname: "/" }, history: { replaceState() {} }, sessionStorage: kept, localStorage: kept,
     ResizeObserver: class { observe() {} }, MutationObserver: class { observe() {} }, matchMedia: () => ({ matches: false }), requestAnimationFrame() {},
