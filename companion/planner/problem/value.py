@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import shapely
@@ -35,6 +35,7 @@ from companion.planner.problem.parts import (
     Current,
     ProblemWind,
     RiskLimit,
+    Sigma,
     interpolated,
 )
 
@@ -46,6 +47,7 @@ BEAT_CLEAR_SHARE = 0.98
 VESSELS_SHARE = 0.1
 """Of 1 - delta_s, given to vessels where the problem does not say: a zone a few percent wider costs less than discs."""
 LEG_SAVING = 1e-5
+Check: TypeAlias = tuple[bool, str]  # whether it holds, and what is wrong where it does not
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -224,6 +226,15 @@ def _coordinates(p: Problem) -> NDArray[np.float64]:
 
 def defect_of(p: Problem) -> str | None:
     """Return the first thing wrong, or None."""
+    defect = _not_finite(p)
+    if defect is not None:
+        return defect
+    checks = (*_checks(p), *_wind_checks(p.wind), *_boat_checks(p.boat))
+    return next((text for holds, text in checks if not holds), None)
+
+
+def _not_finite(p: Problem) -> str | None:
+    """Return what is not a finite number, or a coordinate of no local frame, or None."""
     b, w = p.boat, p.wind
     named = {
         "start.x": p.start_en[0],
@@ -247,17 +258,7 @@ def defect_of(p: Problem) -> str | None:
         "clearance_floor_m": p.clearance_floor_m,
         "leg_saving": p.leg_saving,
         "known": sum(map(sum, p.known_en)),
-        "wind.sigma": sum(
-            (
-                w.sigma.sigma0_rad,
-                w.sigma.growth_rad_per_sqrt_s,
-                w.sigma.sigma_inf_rad,
-                w.sigma.rho_hz,
-                *w.sigma.horizon_s,
-                *w.sigma.sigma_rad,
-                *(w.sigma.half_width_rad or ()),
-            )
-        ),
+        "wind.sigma": sum((*_rates(w.sigma), *w.sigma.horizon_s)),
         "boat.speed": sum((*b.polar_twa_rad, *b.polar_mps)),
     }
     for t in p.targets:
@@ -272,10 +273,67 @@ def defect_of(p: Problem) -> str | None:
     far = float(np.max(np.abs(coordinates), initial=0.0))
     if max(far, *map(abs, p.start_en), *map(abs, p.goal_en)) > 1e9:
         return "a coordinate is beyond 1e9 m: this is not a local frame in metres"
-    checks = (
+    return None
+
+
+def _rates(sigma: Sigma) -> tuple[float, ...]:
+    """Return the numbers of the wind's spread, none of which is negative."""
+    of_time = (*sigma.sigma_rad, *(sigma.half_width_rad or ()))
+    return (sigma.sigma0_rad, sigma.growth_rad_per_sqrt_s, sigma.sigma_inf_rad, sigma.rho_hz, *of_time)
+
+
+def _checks(p: Problem) -> tuple[Check, ...]:
+    """Return what must hold of the promise, the water and the vessels."""
+    beat, zone, risk = p.beat, p.zone, p.risk
+    return (
         (0.5 <= p.delta_s < 1.0, f"delta_s {p.delta_s:g} is outside 0.5 <= delta_s < 1"),
         (p.goal_radius_m >= 0.0, f"the goal radius {p.goal_radius_m:g} m is negative"),
+        (min(p.current.drift_mps, p.adrift.drift_mps) >= 0.0, "the current's drift is negative"),
+        (p.clearance_floor_m >= 0.0, "the clearance floor is negative"),
+        (p.leg_saving >= 0.0, "leg_saving is negative"),
+        (
+            risk is None or (0.0 < risk.max_path_risk <= 1.0 and risk.correlation_time_s > 0.0),
+            "risk needs 0 < max_path_risk <= 1 and correlation_time_s > 0",
+        ),
+        (p.fence is None or not p.fence.is_empty, "the fence is empty"),
+        (p.fence_polygon is None or not p.fence_polygon.is_empty, "the fence less the clearance floor is empty"),
+        (
+            p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
+            "allocation.vessels is not between 0 and 1 - delta_s",
+        ),
+        (
+            beat is None
+            or (
+                0.0 < beat.no_go_half_rad < 0.5 * math.pi
+                and 0.0 < beat.corridor_m < math.inf
+                and 0.0 <= beat.clearance_m < math.inf
+                and 0.0 <= beat.tack_s < math.inf
+            ),
+            "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0",
+        ),
+        (p.tracking is None or p.tracking.is_finite, "tracking has a number that is negative or not finite"),
+        (
+            beat is None or p.current.drift_mps == 0.0 or zone is not None,
+            "a beat left to the autopilot in a current needs its zone",
+        ),
+        (
+            zone is None or (math.isfinite(zone.from_rad) and 0.0 <= zone.half_rad < math.pi),
+            "zone needs a finite from_deg and 0 <= half_deg < 180",
+        ),
+    )
+
+
+def _wind_checks(w: ProblemWind) -> tuple[Check, ...]:
+    return (
         (w.tws_mps is None or w.tws_mps > 0.0, "there is no wind: wind.speed_mps is not above zero"),
+        (w.strength is None or w.strength.is_sound, "wind.strength has a number that is negative or not finite"),
+        (min(_rates(w.sigma)) >= 0.0, "a sigma, growth or rate of the wind is negative"),
+    )
+
+
+def _boat_checks(b: BoatLimits) -> tuple[Check, ...]:
+    limits = least, most = b.min_tws_mps, b.max_tws_mps
+    return (
         (b.turn_rate_radps > 0.0, "the turn rate is not above zero"),
         (b.no_go_half_rad >= 0.0, "the no-go half angle is negative"),
         (b.max_twa_rad > 0.0, "max_twa_deg is not above zero"),
@@ -295,67 +353,10 @@ def defect_of(p: Problem) -> str | None:
             len(b.lee_mps) == 2 and all(0.0 <= lee < math.inf for lee in b.lee_mps),
             "lee_mps is not two speeds, each 0 or more",
         ),
-        (
-            all(limit is None or 0.0 < limit < math.inf for limit in (b.max_tws_mps, b.min_tws_mps)),
-            "a limit of wind is not above zero",
-        ),
-        (
-            b.max_tws_mps is None or b.min_tws_mps is None or b.min_tws_mps < b.max_tws_mps,
-            "min_tws_mps is not below max_tws_mps",
-        ),
-        (w.strength is None or w.strength.is_sound, "wind.strength has a number that is negative or not finite"),
+        (all(limit is None or 0.0 < limit < math.inf for limit in limits), "a limit of wind is not above zero"),
+        (least is None or most is None or least < most, "min_tws_mps is not below max_tws_mps"),
         (b.speeds is None or b.speeds.is_sound, "boat.speeds has a number that is negative or not finite"),
-        (min(p.current.drift_mps, p.adrift.drift_mps) >= 0.0, "the current's drift is negative"),
-        (p.clearance_floor_m >= 0.0, "the clearance floor is negative"),
-        (p.leg_saving >= 0.0, "leg_saving is negative"),
-        (
-            min(
-                (
-                    w.sigma.sigma0_rad,
-                    w.sigma.growth_rad_per_sqrt_s,
-                    w.sigma.sigma_inf_rad,
-                    w.sigma.rho_hz,
-                    *w.sigma.sigma_rad,
-                    *(w.sigma.half_width_rad or ()),
-                )
-            )
-            >= 0.0,
-            "a sigma, growth or rate of the wind is negative",
-        ),
-        (
-            p.risk is None or (0.0 < p.risk.max_path_risk <= 1.0 and p.risk.correlation_time_s > 0.0),
-            "risk needs 0 < max_path_risk <= 1 and correlation_time_s > 0",
-        ),
-        (p.fence is None or not p.fence.is_empty, "the fence is empty"),
-        (p.fence_polygon is None or not p.fence_polygon.is_empty, "the fence less the clearance floor is empty"),
-        (
-            p.vessels_part is None or 0.0 < p.vessels_part < 1.0 - p.delta_s,
-            "allocation.vessels is not between 0 and 1 - delta_s",
-        ),
-        (
-            p.beat is None
-            or (
-                0.0 < p.beat.no_go_half_rad < 0.5 * math.pi
-                and 0.0 < p.beat.corridor_m < math.inf
-                and 0.0 <= p.beat.clearance_m < math.inf
-                and 0.0 <= p.beat.tack_s < math.inf
-            ),
-            "beat needs 0 < no_go_half_deg < 90, corridor_m > 0, clearance_m >= 0 and tack_s >= 0",
-        ),
-        (p.tracking is None or p.tracking.is_finite, "tracking has a number that is negative or not finite"),
-        (
-            p.beat is None or p.current.drift_mps == 0.0 or p.zone is not None,
-            "a beat left to the autopilot in a current needs its zone",
-        ),
-        (
-            p.zone is None or (math.isfinite(p.zone.from_rad) and 0.0 <= p.zone.half_rad < math.pi),
-            "zone needs a finite from_deg and 0 <= half_deg < 180",
-        ),
     )
-    for holds, text in checks:
-        if not holds:
-            return text
-    return None
 
 
 # One promise for the wind and for uncertain vessels: the share of each, and the vessels' discs.
