@@ -13,6 +13,10 @@ const LEAST_SCALE = 0.0001;   // px a metre: an ocean
 
 /** @type {Camera} */
 const camera = { centre: [0, 0], scale: 1, up: 0, width: 600, height: 400 };
+/** The camera by which the signs are written. While the picture only moves they lie where they lay, and their layer moves. @type {Camera} */
+const anchor = { ...camera };
+/** What is seen, in the pixels of that layer. */
+const seen = { left: 0, top: 0, right: 600, bottom: 400 };
 /** @typedef {{name: string, past: Past, off: number, count: number}} Other  another voyage: seconds to add to its time, samples until now */
 /** @typedef {{way: Point[], risks: (number | null)[]}} Preview */
 /** @type {{up: string, follow: boolean, fitted: boolean, view: View | null, area: Area | null, past: Past | null, preview: Preview | null, picks: ((en: Point) => void) | null, other: Other | null}} */
@@ -27,10 +31,10 @@ const root = picture("map");
 export function build() {
   const world = svg("g", { class: "world" });
   for (const name of ["chart", "passage", "limits", "grown", "drying", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
-  root.append(svg("defs", {}, pattern()), layers.world = world);
-  for (const name of ["grid", "passagesigns", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat", "furniture", "drawing"]) {
-    root.append(layers[name] = svg("g", { class: name }));
-  }
+  const signs = svg("g", { class: "signs" });
+  for (const name of ["grid", "passagesigns", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat"]) signs.append(layers[name] = svg("g", { class: name }));
+  root.append(svg("defs", {}, pattern()), layers.world = world, layers.signs = signs);
+  for (const name of ["furniture", "drawing"]) root.append(layers[name] = svg("g", { class: name }));
   passage.build(/** @type {SVGElement} */ (layers.passage), /** @type {SVGElement} */ (layers.passagesigns));
   new ResizeObserver(() => { measure(); draw(); }).observe(root);
   measure();
@@ -193,7 +197,7 @@ function water() {
     fill(name, pictures.map((shapes) => sketch("path", { d: shapes.flat().map(ring).join(""), "fill-rule": "evenodd" })));
   };
   const { area } = state;
-  for (const name of /** @type {const} */ (["grown", "obstacles", "limits"])) draw(name, area === null ? [] : [area[name]]);
+  for (const name of /** @type {const} */ (["grown", "obstacles", "limits"])) draw(name, (area?.[name] ?? []).map((shape) => [shape]));   // a path each: a browser draws but those that a tile of the picture meets
   draw("drying", (area?.drying ?? []).map((water) => water.shapes));
 }
 
@@ -218,9 +222,10 @@ function draw() {
   charts.draw(camera, state.area);
   tides(view);
   drawing.under?.(camera);
-  const at = (/** @type {Point} */ en) => project(camera, en);
+  moveSigns();
+  const at = (/** @type {Point} */ en) => project(anchor, en);
   grid(at);
-  passage.draw(view, { at, camera, isSouth: (state.area?.origin_lat_deg ?? 0) < 0 });
+  passage.draw(view, { at, seen, up: camera.up, isSouth: (state.area?.origin_lat_deg ?? 0) < 0 });
   passage.say(view);
   track();
   laylines(view, at);
@@ -233,7 +238,20 @@ function draw() {
   beside(at);
   own(view, at);
   furniture(view, wind);
-  if (drawing.over) layers.drawing?.replaceChildren(...drawing.over(at, camera));
+  if (drawing.over) layers.drawing?.replaceChildren(...drawing.over((en) => project(camera, en), camera));
+}
+
+/** Move the layer of the signs, or write them by the present camera where it is turned, nearer, or far away. */
+function moveSigns() {
+  let [x, y] = project(camera, anchor.centre);
+  const isFar = Math.hypot(x, y) > 3 * (camera.width + camera.height);
+  if (isFar || anchor.scale !== camera.scale || anchor.up !== camera.up || anchor.width !== camera.width || anchor.height !== camera.height) {
+    Object.assign(anchor, camera, { centre: [...camera.centre] });
+    [x, y] = [camera.width / 2, camera.height / 2];
+  }
+  const left = camera.width / 2 - x, top = camera.height / 2 - y;
+  Object.assign(seen, { left, top, right: left + camera.width, bottom: top + camera.height });
+  set(/** @type {SVGElement} */ (layers.signs), { transform: `translate(${-left} ${-top})` });
 }
 
 /** @param {string} name @param {import("./dom.js").Sketch[]} children */
@@ -248,13 +266,11 @@ function grid(at) {
   const corners = [[0, 0], [camera.width, 0], [0, camera.height], [camera.width, camera.height]].map(
     (p) => unproject(camera, /** @type {Point} */ (p)));
   const es = corners.map((p) => p[0]), ns = corners.map((p) => p[1]);
+  // from line to line: while none comes into sight the grid is the same
+  const [west, east] = [Math.floor(Math.min(...es) / step), Math.ceil(Math.max(...es) / step)], [south, north] = [Math.floor(Math.min(...ns) / step), Math.ceil(Math.max(...ns) / step)];
   const lines = [];
-  for (let e = Math.ceil(Math.min(...es) / step) * step; e <= Math.max(...es); e += step) {
-    lines.push(path([at([e, Math.min(...ns)]), at([e, Math.max(...ns)])]));
-  }
-  for (let n = Math.ceil(Math.min(...ns) / step) * step; n <= Math.max(...ns); n += step) {
-    lines.push(path([at([Math.min(...es), n]), at([Math.max(...es), n])]));
-  }
+  for (let e = west; e <= east; e++) lines.push(path([at([e * step, south * step]), at([e * step, north * step])]));
+  for (let n = south; n <= north; n++) lines.push(path([at([west * step, n * step]), at([east * step, n * step])]));
   fill("grid", [sketch("path", { d: lines.join("") })]);
 }
 
@@ -444,7 +460,7 @@ function places(view, at) {
     let line = y;
     while (taken.some(([a, b]) => Math.abs(a - x) < 70 && Math.abs(b - line) < 12)) line += 12;
     taken.push([x, line]);
-    const isCut = x + 8 * text.length > camera.width;
+    const isCut = x + 8 * text.length > seen.right;
     children.push(sketch("text", { x: isCut ? x - 18 : x, y: line, class: `word ${kind}`, "text-anchor": isCut ? "end" : "start" }, text));
   }
   const land = (/** @type {string} */ name, /** @type {Point[]} */ ring, /** @type {string} */ kind) => {
@@ -494,7 +510,7 @@ function beside(at) {
   const n = other.count - 1, e = other.past.east_m[n], m = other.past.north_m[n];
   if (e == null || m == null) return fill("ghost", []);
   const [x, y] = at([e, m]);
-  fill("ghost", [sketch("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", transform: `translate(${x} ${y}) rotate(${(other.past.heading_deg[n] ?? 0) - camera.up})` }), sketch("text", { x: x + (x > camera.width - 110 ? -9 : 9), y: y + 12, class: "word small", "text-anchor": x > camera.width - 110 ? "end" : "start" }, `beside: ${other.name}`)]);
+  fill("ghost", [sketch("path", { d: "M0-13C5-6 5 3 3.5 9H-3.5C-5 3-5-6 0-13Z", transform: `translate(${x} ${y}) rotate(${(other.past.heading_deg[n] ?? 0) - camera.up})` }), sketch("text", { x: x + (x > seen.right - 110 ? -9 : 9), y: y + 12, class: "word small", "text-anchor": x > seen.right - 110 ? "end" : "start" }, `beside: ${other.name}`)]);
 }
 
 /** @param {View | null} view @param {(en: Point) => Point} at */

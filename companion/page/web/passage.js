@@ -3,8 +3,9 @@ import { get, renew, set, sketch, svg, table } from "./dom.js";
 import { bearing, distance, NONE, speed, speedUnit } from "./format.js";
 import { path } from "./geometry.js";
 
-/** @typedef {import("../../view/view").Passage} Passage @typedef {import("../../view/view").View} View @typedef {import("./geometry.js").Point} Point @typedef {import("./geometry.js").Camera} Camera */
-/** @typedef {{at: (en: Point) => Point, camera: Camera, isSouth: boolean}} Chart */
+/** @typedef {import("../../view/view").Passage} Passage @typedef {import("../../view/view").View} View @typedef {import("./geometry.js").Point} Point */
+/** @typedef {{left: number, top: number, right: number, bottom: number}} Seen  px */
+/** @typedef {{at: (en: Point) => Point, seen: Seen, up: number, isSouth: boolean}} Chart */
 
 const FREE_PX = 40, EDGE_PX = 30;      // between two barbs; beyond the picture
 const FAR = 0.002, NEAR_M = 50;        // of a place's distance, and in metres: two that are one place on the chart
@@ -160,14 +161,14 @@ export function draw(view, chart) {
   if (passage === null || !state.isShown) return renew(signs, []);
   /** @type {Point[]} */
   const taken = [];
-  const isFree = (/** @type {Point} */ p, /** @type {number} */ px) => isSeen(p, chart.camera) && !taken.some((q) => Math.hypot(p[0] - q[0], p[1] - q[1]) < px);
+  const isFree = (/** @type {Point} */ p, /** @type {number} */ px) => isSeen(p, chart.seen) && !taken.some((q) => Math.hypot(p[0] - q[0], p[1] - q[1]) < px);
   renew(signs, [...now(passage, view, chart), ...waypoints(passage, chart), ...weather(passage, chart, isFree, taken),
     ...hours(passage, chart, isFree, taken), ...ends(passage, chart)]);
 }
 
-/** @param {Point} p @param {Camera} camera */
-function isSeen(p, camera) {
-  return p[0] > -EDGE_PX && p[1] > -EDGE_PX && p[0] < camera.width + EDGE_PX && p[1] < camera.height + EDGE_PX;
+/** @param {Point} p @param {Seen} seen */
+function isSeen(p, seen) {
+  return p[0] > seen.left - EDGE_PX && p[1] > seen.top - EDGE_PX && p[0] < seen.right + EDGE_PX && p[1] < seen.bottom + EDGE_PX;
 }
 
 /** Where the members are now, and where the middle run is. @param {Passage} passage @param {View | null} view @param {Chart} chart */
@@ -190,11 +191,11 @@ function waypoints(passage, chart) {
   const taken = [];
   for (const point of passage.waypoints) {
     const [x, y] = chart.at(point.at_en_m);
-    if (!isSeen([x, y], chart.camera)) continue;
+    if (!isSeen([x, y], chart.seen)) continue;
     out.push(sketch("circle", { cx: x, cy: y, r: 3.5, class: "ppoint" }));
     if (taken.some(([a, b]) => Math.abs(a - x) < 110 && Math.abs(b - y) < 14)) continue;
     taken.push([x, y]);
-    const isCut = x > chart.camera.width - 80;
+    const isCut = x > chart.seen.right - 80;
     if (point.middle_s !== null) out.push(sketch("text", { x: isCut ? x - 7 : x + 7, y: y + 28, class: "word small pword", "text-anchor": isCut ? "end" : "start" }, when(passage.departs_unix_s + point.middle_s)));
   }
   return out;
@@ -208,10 +209,10 @@ function weather(passage, chart, isFree, taken) {
     const at = chart.at(one.at_en_m);
     if (!isFree(at, FREE_PX)) continue;
     taken.push(at);
-    const turn = one.wind_from_deg + one.north_deg - chart.camera.up;
+    const turn = one.wind_from_deg + one.north_deg - chart.up;
     out.push(sketch("path", { class: "pbarb", d: barb(one.wind_mps, chart.isSouth ? -1 : 1), transform: `translate(${at[0].toFixed(1)} ${at[1].toFixed(1)}) rotate(${turn.toFixed(1)})` }));
     if (one.current_towards_deg !== null && one.current_mps !== null && one.current_mps >= 0.05) {
-      const long = Math.min(34, 12 + 16 * one.current_mps), set_deg = one.current_towards_deg + one.north_deg - chart.camera.up;
+      const long = Math.min(34, 12 + 16 * one.current_mps), set_deg = one.current_towards_deg + one.north_deg - chart.up;
       out.push(sketch("path", { class: "pflow", d: `M0 0V${-long}M-4 ${-long + 6}L0 ${-long}L4 ${-long + 6}`, transform: `translate(${at[0].toFixed(1)} ${at[1].toFixed(1)}) rotate(${set_deg.toFixed(1)})` }));
     }
   }
@@ -248,7 +249,7 @@ function hours(passage, chart, isFree, taken) {
 function ends(passage, chart) {
   return passage.ends.flatMap((end) => {
     const [x, y] = chart.at(end.at_en_m);
-    return isSeen([x, y], chart.camera) ? [sketch("path", { d: `M${x - 5} ${y - 5}l10 10M${x - 5} ${y + 5}l10 -10`, class: "pend" }), sketch("text", { x: x + 8, y: y - 7, class: "word small pword" }, `${end.runs} of ${passage.runs} runs end`)] : [];
+    return isSeen([x, y], chart.seen) ? [sketch("path", { d: `M${x - 5} ${y - 5}l10 10M${x - 5} ${y + 5}l10 -10`, class: "pend" }), sketch("text", { x: x + 8, y: y - 7, class: "word small pword" }, `${end.runs} of ${passage.runs} runs end`)] : [];
   });
 }
 

@@ -42,7 +42,7 @@ test("the harbour is drawn", () => {
 /** @param {string} name of a layer */
 function drawn(name) {
   const layers = element("map").children[1].children;
-  return layers.find((layer) => layer.attributes.class === name).children[0].attributes.d;
+  return layers.find((layer) => layer.attributes.class === name).children.map((shape) => shape.attributes.d).join("");
 }
 
 test("a frame in which the water moves asks for one corner of a shape at the most and writes little", () => {
@@ -96,4 +96,25 @@ test("a track is drawn again when it has grown, and not because the water moves"
   map.show(null, null, null);
   assert.equal(tail(), undefined);
   assert.equal(beside(), 0);
+});
+
+test("what is written on the water lies where it lay while the water moves, and is written anew where it is nearer", () => {
+  const area = { name: "", origin_lat_deg: 0, origin_lon_deg: 0, lat_m: 111_000, lon_m: 111_000, hash: "", obstacles: [], names: [], grown: [], limits: [], drying: [], margin_m: 1 };
+  const vessels = Array.from({ length: 40 }, (_, n) => ({ name: `ship ${n}`, at_en_m: [10 * n, 5 * n], heading_deg: 20, course_deg: 20, alarm: "none", cpa_s: 20 + n, cpa_m: 9, cpa_en_m: [n, n], own_cpa_en_m: [0, n], length_m: 9, beam_m: 3 }));
+  const view = { t_s: 0, boat: { at_en_m: [0, 0], heading_deg: 10, cog_deg: 12, sog_mps: 2 }, goals: [{ name: "buoy", kind: "point", at_en_m: [90, 40], radius_m: 9 }], refuges: [], home: null, safe_end: null, orders: {}, predicted: [], plan: null, vessels };
+  map.show(view, area, null);
+  map.orient("north");
+  map.centre([0, 0]);
+  const signs = () => element("map").children.find((layer) => layer.attributes.class === "signs"), of = (name) => signs().children.find((layer) => layer.attributes.class === name);
+  assert.equal(of("vessels").children.length, 40 * 7);
+  const told = cost("pan among 40 ships", (n) => map.centre([10 * Math.sin(n / 12), 10 * Math.sin(n / 19)]));
+  assert.ok(told.elements < 30 && told.characters < 3500, "the mission's own alone");
+  const ship = () => of("vessels").children[4].attributes.transform, at = ship(), { scale } = map.middle();
+  map.centre([30, -20]);
+  assert.equal(ship(), at);
+  const [x, y] = signs().attributes.transform.match(/-?[\d.]+/g).map(Number), [sx, sy] = at.match(/-?[\d.]+/g).map(Number);
+  assert.ok(Math.hypot(x + sx - (390 / 2 - 30 * scale), y + sy - (700 / 2 - 20 * scale)) < 1e-6, "where the camera sees it");
+  map.zoom(2);
+  assert.notEqual(ship(), at);
+  map.show(null, null, null);
 });
