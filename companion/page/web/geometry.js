@@ -59,6 +59,25 @@ export function path(points, closed = false) {
   return "M" + points.map((p) => `${p[0].toFixed(1)} ${p[1].toFixed(1)}`).join("L") + (closed ? "Z" : "");
 }
 
+/** A line from left to right with four points a pixel at the most: of those in one the first, the lowest, the highest and the last,
+ * which are drawn as all of them are. @param {readonly Point[]} points @returns {Point[]} */
+export function thinned(points) {
+  /** @type {Point[]} */
+  const out = [];
+  for (let n = 0; n < points.length;) {
+    const column = Math.floor(points[n]?.[0] ?? 0);
+    let end = n + 1, low = n, high = n;
+    for (let y = points[n]?.[1] ?? 0, least = y, most = y; end < points.length && Math.floor(points[end]?.[0] ?? 0) === column; end++) {
+      y = points[end]?.[1] ?? 0;
+      if (y < least) { least = y; low = end; }
+      if (y > most) { most = y; high = end; }
+    }
+    for (const k of new Set([n, Math.min(low, high), Math.max(low, high), end - 1])) out.push(/** @type {Point} */ (points[k]));
+    n = end;
+  }
+  return out;
+}
+
 /** The track in pieces of one tack, each beginning where the one before ends. A gap in the positions parts it, too.
  * @param {readonly (number | null)[]} east @param {readonly (number | null)[]} north @param {readonly (boolean | null)[]} starboard
  * @returns {{starboard: boolean | null, points: Point[]}[]} */

@@ -30,7 +30,7 @@ const root = picture("map");
 
 export function build() {
   const world = svg("g", { class: "world" });
-  for (const name of ["chart", "passage", "limits", "grown", "drying", "obstacles", "fan", "other", "track"]) world.append(layers[name] = svg("g", { class: name }));
+  for (const name of ["chart", "passage", "limits", "grown", "drying", "obstacles", "fan", "other", "tocome", "track"]) world.append(layers[name] = svg("g", { class: name }));
   const signs = svg("g", { class: "signs" });
   for (const name of ["grid", "passagesigns", "wedge", "lay", "plan", "ahead", "preview", "places", "vessels", "ghost", "boat"]) signs.append(layers[name] = svg("g", { class: name }));
   root.append(svg("defs", {}, pattern()), layers.world = world, layers.signs = signs);
@@ -284,6 +284,24 @@ function isTracked(name, made) {
   return before !== undefined && made.every((one, n) => one === before[n]);
 }
 
+const PIECE = 256;   // samples of the past that are written once, as soon as they are whole
+/** @type {{made: readonly unknown[], pieces: Map<string, import("./dom.js").Sketch[]>}} */
+const whole = { made: [], pieces: new Map() };
+
+/** What is drawn of samples. @param {Past} past @param {number} from @param {number} to the first that is not @param {boolean} hasCome */
+function pieces(past, from, to, hasCome) {
+  /** @type {import("./dom.js").Sketch[]} */
+  const out = [];
+  for (let begin = PIECE * Math.floor(from / PIECE); begin + 1 < to; begin += PIECE) {
+    const [a, b] = [Math.max(from, begin), Math.min(to, begin + PIECE + 1)], isWhole = b - a === PIECE + 1, name = `${begin} ${hasCome}`;
+    const made = (isWhole ? whole.pieces.get(name) : undefined) ?? byTack(past.east_m.slice(a, b), past.north_m.slice(a, b), hasCome ? past.starboard.slice(a, b) : []).map((piece) =>
+      sketch("path", { d: path(piece.points), class: !hasCome ? null : piece.starboard === null ? "unknown" : piece.starboard ? "starboard" : "port" }));
+    if (isWhole) whole.pieces.set(name, made);
+    out.push(...made);
+  }
+  return out;
+}
+
 function track() {
   const past = state.past;
   // what has not come yet of a recorded voyage is shown faintly: what was known then against what came
@@ -291,15 +309,10 @@ function track() {
   let count = length;
   while (past !== null && count > 0 && (past.t_s[count - 1] ?? 0) > now + 0.05) count -= 1;
   if (isTracked("track", [past, length, past?.t_s[0], past?.t_s[length - 1], count])) return;   // a past grows at its end, and is cut at its beginning
-  if (past === null) return fill("track", []);
-  const pieces = byTack(past.east_m.slice(0, count), past.north_m.slice(0, count), past.starboard.slice(0, count));
-  const children = pieces.map((piece) => sketch("path", {
-    d: path(piece.points), class: piece.starboard === null ? "unknown" : piece.starboard ? "starboard" : "port" }));
-  if (count < past.t_s.length) {
-    const rest = byTack(past.east_m.slice(Math.max(0, count - 1)), past.north_m.slice(Math.max(0, count - 1)), []);
-    children.unshift(...rest.map((piece) => sketch("path", { d: path(piece.points), class: "tocome" })));
-  }
-  fill("track", children);
+  if (past === null) { fill("tocome", []); return fill("track", []); }
+  if (whole.made[0] !== past || whole.made[1] !== past.t_s[0]) Object.assign(whole, { made: [past, past.t_s[0]], pieces: new Map() });
+  fill("track", pieces(past, 0, count, true));
+  fill("tocome", count < length ? pieces(past, Math.max(0, count - 1), length, false) : []);
 }
 
 /** @param {View | null} view @param {(en: Point) => Point} at */

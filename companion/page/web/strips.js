@@ -1,7 +1,7 @@
 // Histories: direction, strength, speed, clearance; with what was forecast a minute before, and what is forecast now.
 import { picture, renew, set, sketch } from "./dom.js";
 import { bearing, clock, distance, scaled, speed, speedUnit } from "./format.js";
-import { minutes, path, scale, unwrapped, wrap } from "./geometry.js";
+import { minutes, path, scale, thinned, unwrapped, wrap } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
 /** @typedef {{name: string, unit: string, values: (number | null)[], low: (number | null)[], high: (number | null)[], ahead: [number, number, number][], other: [number, number][], label: (v: number) => string, now: string, least: number, line: number | null, floor: number | null, steps: number[]}} Strip */
@@ -109,7 +109,7 @@ function draw(strip, top, t, x, now, width, begin) {
     const at = (t[n] ?? 0) + AHEAD_S, h = strip.high[n];
     if (v !== null && h !== null && h !== undefined && at >= begin && at <= now) { lows.push([x(at), y(v)]); highs.push([x(at), y(h)]); }
   });
-  if (lows.length > 1) out.push(sketch("path", { class: "band", d: path([...lows, ...highs.reverse()], true) }));
+  if (lows.length > 1) out.push(sketch("path", { class: "band", d: path([...thinned(lows), ...thinned(highs).reverse()], true) }));
   const coming = strip.ahead.filter((a) => x(a[0]) <= right + 1);
   if (coming.length > 1) {
     out.push(sketch("path", { class: "coming", d: path([...coming.map((a) => /** @type {Point} */ ([x(a[0]), y(a[1])])), ...coming.reverse().map((a) => /** @type {Point} */ ([x(a[0]), y(a[2])]))], true) }));
@@ -123,8 +123,8 @@ function draw(strip, top, t, x, now, width, begin) {
     if (v === null || v === undefined || at < begin) pieces.push([]);
     else pieces[pieces.length - 1]?.push([x(at), y(v)]);
   });
-  if (strip.other.length > 1) out.push(sketch("path", { class: "otherline", d: path(strip.other.map(([at, v]) => [x(at), y(v)])) }));
-  out.push(sketch("path", { class: `line ${strip.name}`, d: pieces.filter((p) => p.length > 1).map((p) => path(p)).join("") }));
+  if (strip.other.length > 1) out.push(sketch("path", { class: "otherline", d: path(thinned(strip.other.map(([at, v]) => [x(at), y(v)]))) }));
+  out.push(sketch("path", { class: `line ${strip.name}`, d: pieces.filter((p) => p.length > 1).map((p) => path(thinned(p))).join("") }));
   out.push(sketch("text", { x: right + 8, y: top + 14, class: "stripname" }, strip.unit ? `${strip.name} ${strip.unit}` : strip.name), sketch("text", { x: right + 8, y: top + 38, class: "stripvalue" }, strip.now.replace(" m", "")));
   return out;
 }

@@ -150,3 +150,15 @@ test("water that dries is as it is at the moment that is shown, with when that c
   assert.deepEqual(format.drying([[null, null]], at(8)), { isSolid: true, words: "solid" });
   assert.deepEqual(format.drying(spans, null), { isSolid: true, words: "solid: the time is not known" });
 });
+
+test("a line of many points a pixel keeps those by which it is drawn", () => {
+  const line = [[0.1, 5], [0.2, 9], [0.3, 1], [0.4, 4], [0.9, 6], [1, 2], [1.5, 3], [3.2, 7]];
+  assert.deepEqual(g.thinned(line), [[0.1, 5], [0.2, 9], [0.3, 1], [0.9, 6], [1, 2], [1.5, 3], [3.2, 7]]);
+  assert.deepEqual(g.thinned([]), []);
+  const dense = Array.from({ length: 7200 }, (_, n) => [n / 16, Math.sin(n * n)]), few = g.thinned(dense);
+  assert.ok(few.length <= 4 * 450);
+  for (let x = 0; x < 450; x++) {
+    const ys = (points) => points.filter((p) => Math.floor(p[0]) === x).map((p) => p[1]);
+    assert.deepEqual([Math.min(...ys(few)), Math.max(...ys(few)), ys(few)[0], ys(few).at(-1)], [Math.min(...ys(dense)), Math.max(...ys(dense)), ys(dense)[0], ys(dense).at(-1)]);
+  }
+});
