@@ -72,6 +72,22 @@ def test_the_upload_that_turns_her_ends_in_a_loiter_on_her_own_track():
     assert distance_m(world.position, route.points_en_m[-1]) >= 25.0
 
 
+def test_once_she_has_turned_the_place_abeam_is_left_for_the_way_back():
+    """She held on for 25 m to the side, over water that she had never sounded, and struck the bank beside her track."""
+    world = voyage_over_a_bank()
+    tell, _ = sounded(world)
+    assert world.run(400, lambda w: tell(w) or said(w, "turning back"))
+    track_east = world.position[0]
+    assert world.run(10, lambda w: tell(w) or w.state.mission.route.rung == BACK)
+    items = world.state.mission.route.items
+    before = len(world.actions)
+    world.run(12, tell)
+    asked = [a for _, a in world.actions[before:] if isinstance(a, act.SetCurrent)]
+    assert [a.seq for a in asked] == [len(items)]
+    aside = max(abs(east - track_east) for east, _ in world.track[-20:])
+    assert aside < 15.0
+
+
 def test_without_the_permission_to_upload_she_is_only_told():
     world = voyage_over_a_bank()
     tell, _ = sounded(world)

@@ -14,12 +14,13 @@ import numpy as np
 import shapely
 
 from companion.frozen import changed
+from companion.geo.angles import difference_rad
 from companion.messages import Command, Severity, waypoint
-from companion.skipper.behaviors.helm import hand_back
+from companion.skipper.behaviors.helm import hand_back, make_current
 from companion.skipper.planning.uploads import upload
 from companion.skipper.step import CancelPlan, Phase, ReplanReason, StepContext
 from companion.skipper.step.state import Sounded
-from companion.skipper.way.geometry import distance_m, is_tack, moved
+from companion.skipper.way.geometry import bearing_rad, distance_m, is_tack, moved
 from companion.skipper.way.shoals import MOST_SHOALS, Shoal, found, over, water_taken
 from companion.skipper.way.voyage import PointEn
 
@@ -215,6 +216,10 @@ def _goes_back(ctx: StepContext, boat: PointEn, velocity_en_mps: tuple[float, fl
     depth_m, least_m = ctx.autopilot.depth_m if ctx.autopilot is not None else None, ctx.config.least_depth_m
     is_deep = depth_m is not None and least_m is not None and depth_m >= least_m + SPARE_M
     has_opened = made_good_mps >= WAY_MPS and distance_m(boat, memory.turned_en_m) >= OPENED_M and is_deep
+    course_rad = math.atan2(*velocity_en_mps)
+    is_turned = abs(difference_rad(course_rad, bearing_rad(boat, place))) <= max(ABEAM_RAD)
+    if is_turned and ctx.state.mission.index < len(route.items) - 1:
+        make_current(ctx, len(route.items))  # the place abeam has served: nobody has sounded there
     if left_m <= THERE_M or has_opened or ctx.t_s - memory.turned_s > GIVES_UP_S:
         ctx.set(
             plans=changed(ctx.state.plans, asked="it shoaled: with what was found", asked_as=ReplanReason.OBSTACLE),
