@@ -574,6 +574,11 @@ _LATTICES = (
     (400_000, 2),
     (800_000, 2),
 )
+_GYBED_LATE = 5.5
+"""When the zone of a lattice for a beat of gybes is fitted, in multiples of the bound.
+
+The bound knows nothing of the way that a gybe loses: through narrow water the beat takes several times as long, and on
+a lattice that fits the zone of an earlier time its last boards are closed."""
 _TURNS_S, _TURNS_TESTS = 0.25, 60_000
 """What must be left, in seconds or in visibility tests, for the bound on turns, which takes some 30 ms."""
 _DRIFTS = (
@@ -664,7 +669,10 @@ def _lattices(s: Searcher) -> str | None:
     """Run ever finer lattices until there is a path; return why there is none if that is proved."""
     for step, (cells, reach) in enumerate(_LADDER):
         if s.world.boat.kind != 0 and step < 4:
-            s.drift(2 * cells, 1.45, math.inf)
+            if s.world.boat.can_tack:
+                s.drift(2 * cells, 1.45, math.inf)
+            else:  # a drift takes a gybe for time alone: where its way has no room, none of the paths can be sailed
+                s.lattice(2 * cells, 1, margin=0.5, half_at_s=_GYBED_LATE * s.bound.value_s)
         late = (1.3, 2.5, 1.0)[step % 3] * s.bound.value_s
         for margin in (0.25, 0.5):
             if s.effort.is_over:

@@ -103,6 +103,13 @@ class Moves(NamedTuple):
     up_s: Floats
 
 
+class Wound(NamedTuple):
+    """How far the boat has turned [rad, signed]: since its last leg as long as it needs for a gybe round, and here."""
+
+    long: float
+    here: float
+
+
 class End(NamedTuple):
     """An end of the path: arrival [s], place [m], and the corner before it [m] where it is two legs off."""
 
@@ -176,26 +183,38 @@ def _before(moves: Moves, move: int, s: int) -> int:
 
 
 @kernel
-def _wound(b: BoatModel, moves: Moves, came: NDArray[np.uint8], s: int, h0: float) -> float:
-    """Return how far the boat has turned [rad, signed] in state ``s`` since its last leg as long as ``b.room``."""
+def _wound(b: BoatModel, moves: Moves, came: NDArray[np.uint8], s: int, h0: float) -> Wound:
+    """Return how far the boat has turned when it is in state ``s``."""
     nd = moves.twa.shape[0]
-    wound, length = 0.0, 0.0
+    wound, here, length, is_here = 0.0, 0.0, 0.0, True
     for _ in range(256):
         move, k = came[s], s % nd
+        by = 0.0
         if move == _START:
-            return wound + wrap(moves.twa[k] - h0)
-        if move == _ROUND:
-            return wound + wrap(moves.twa[k] - moves.angle[k, _ROUND])
-        before = _before(moves, move, s)
-        if move == _STEP:
+            by = wrap(moves.twa[k] - h0)
+        elif move == _ROUND:
+            by = wrap(moves.twa[k] - moves.angle[k, _ROUND])
+        elif move == _STEP:
+            is_here = False
             length += moves.length[k]
-            if length >= b.room:
-                return wound
         else:
             length = 0.0
-            wound += wrap(moves.twa[k] - moves.twa[before % nd])
-        s = before
-    return wound
+            by = wrap(moves.twa[k] - moves.twa[_before(moves, move, s) % nd])
+        wound += by
+        here += by if is_here else 0.0
+        if move in (_START, _ROUND) or length >= b.room:
+            break
+        s = _before(moves, move, s)
+    return Wound(wound, here)
+
+
+@kernel
+def _is_too_far(b: BoatModel, wound: Wound, by: float) -> bool:
+    """Has the boat turned too far when it turns on by ``by`` [rad]?
+
+    What it turns in one place is one turn of the path, which goes the shorter way: beyond half a circle, by a tack.
+    """
+    return abs(wound.long + by) > b.most_turn or (not b.can_tack and abs(wound.here + by) > b.most_turn)
 
 
 @kernel
@@ -233,7 +252,7 @@ def by_corner(
 
 @kernel
 def _end_from(
-    g: SegmentGrid, b: BoatModel, aim: Aim, x: float, y: float, h: float, t: float, wound: float, bound: float
+    g: SegmentGrid, b: BoatModel, aim: Aim, x: float, y: float, h: float, t: float, wound: Wound, bound: float
 ) -> End:
     """Return the exact end, by the straight leg or, where that is no course, by two; at inf: none before ``bound``."""
     ex, ey, length = nearest_of(aim, x, y)
@@ -244,7 +263,7 @@ def _end_from(
         if abs(a) >= worst_half(b, t1, t2):
             is_open = (
                 t2 < bound
-                and (b.room == 0.0 or abs(wound + wrap(a - h)) <= b.most_turn)
+                and (b.room == 0.0 or not _is_too_far(b, wound, wrap(a - h)))
                 and is_free(g, x, y, ex, ey)
                 and not (meets_discs(b.targets, x, y, x, y, t, t1) or meets_discs(b.targets, x, y, ex, ey, t1, t2))
             )
@@ -318,7 +337,7 @@ def lattice_search(
             if cost[s] < np.inf:
                 keys, items, size = push(keys, items, size, cost[s], s)
     is_watched, n_moves = b.targets.shape[0] > 0, 4 if moves.leg_s < math.inf else 3
-    end, last, pops, wound = End(bound, 0.0, 0.0, 0.0, 0.0, False), -1, 0, 0.0
+    end, last, pops, wound = End(bound, 0.0, 0.0, 0.0, 0.0, False), -1, 0, Wound(0.0, 0.0)
     while size > 0 and keys[0] < end.t:
         s = items[0]
         size = pop(keys, items, size)
@@ -356,7 +375,7 @@ def lattice_search(
             if done[s1] or t1 >= cost[s1]:
                 continue
             turns = move == _ROUND or (move < _STEP and came[s] != _START)
-            if b.room > 0.0 and turns and abs(wound + wrap(angle[k, move] - twa[k])) > b.most_turn:
+            if b.room > 0.0 and turns and _is_too_far(b, wound, wrap(angle[k, move] - twa[k])):
                 continue
             node1 = s1 // nd
             if to_go[node1] < 0.0:

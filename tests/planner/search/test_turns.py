@@ -18,6 +18,7 @@ from companion.planner.search.annealing import anneal
 from companion.planner.search.bound import Bound
 from companion.planner.search.gauge import make_gauge
 from companion.planner.search.kernels import turn_guess, turn_time
+from companion.planner.search.lattice import run_lattice
 from companion.planner.search.moves import WAYS, check_path, overshoot, round_vector, rounded
 from companion.planner.search.world import make_world
 from tests.planner.problem_json import to_dict
@@ -230,6 +231,41 @@ def test_channels_without_tacking(name):
     assert judged.is_feasible
     assert judged.tacks == 0
     assert answer.cost_s > plan(load(name), expansions=20_000).cost_s
+
+
+def gybed_beat(width, length, no_go_deg, sigma):
+    """Return the problem of a channel dead to windward for a boat that cannot tack, hardly wider than a gybe loses."""
+    raw = simple(
+        goal={"x": 0, "y": length, "radius": 10},
+        obstacles=[box(-300, 20, -width / 2, length - 20), box(width / 2, 20, 300, length - 20)],
+        fence=box(-320, -80, 320, length + 80),
+        wind={"from_deg": 0, "speed_mps": 5, "sigma": sigma},
+        delta_s=0.66,
+        boat=boat(can_tack=False, gybe_room_m=30.0, no_go_half_deg=no_go_deg),
+    )
+    return Problem.from_json(raw)
+
+
+def test_a_lattice_turns_by_no_more_than_half_a_circle_in_one_place():
+    """Net of what it had turned on short legs it kept the rule, and every board of its path began with a tack."""
+    p = gybed_beat(110, 300, 60, {"model": "none"})
+    world, half = make_world(p), p.no_go_half_rad(0.0)
+    sizes = (1_600, 6_000, 12_000)
+    found = [
+        run_lattice(world, make_gauge(p), cells=cells, reach=1, half_rad=half, box=world.box).points for cells in sizes
+    ]
+    found = [points for points in found if points is not None]
+    assert found
+    assert all(math.isfinite(check_path(world.grid, world.boat, points, world.h0)) for points in found)
+
+
+def test_a_beat_of_gybes_is_found_where_it_takes_many_times_the_bound():
+    """The zone's edge moves: drifts took the effort, and lattices fitted the zone of too early a time."""
+    p = gybed_beat(105, 600, 50, {"model": "kalman", "sigma0_deg": 8.0, "growth_deg_per_sqrt_s": 0.3})
+    answer = plan(p, expansions=15_000)
+    assert answer.has_path, answer.reason
+    assert answer.cost_s > 2.5 * answer.lower_bound_s
+    assert "tack" not in names(answer)
 
 
 @settings(max_examples=25)
