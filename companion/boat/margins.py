@@ -169,10 +169,10 @@ class Margin:
         return sum(part.value_m for part in self.parts)
 
     def describe(self) -> str:
-        """Return one line: the total and its parts."""
+        """Return one line: the total and its parts, of which it is the sum as they are written."""
         parts = " + ".join(f"{part.name} {part.value_m:.1f}" for part in self.parts)
         tail = "" if self.is_bounded else " (no bound on the beat: SAIL_XTRACK_MAX is 0)"
-        return f"{self.total_m:.1f} m = {parts}{tail}"
+        return f"{sum(round(part.value_m, 1) for part in self.parts):.1f} m = {parts}{tail}"
 
 
 def required_margin(

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from companion.commands.output import force_option, patience, write_out
+from companion.commands.output import force_option, patience, refuse_existing, write_out
 from companion.errors import InputError, JobError
 from companion.program.arguments import out_file, picture
 from companion.program.commands import missing
@@ -83,6 +83,8 @@ def _tell(folder: Path, args: argparse.Namespace) -> None:
 
     for path in args.track:
         format_of(path, TRACKS)
+    if args.out is not None:
+        refuse_existing([str(args.out)], force=args.force)
     record = read_voyage(folder)
     for path in args.track:
         write_out(

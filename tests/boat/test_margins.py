@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.boat import AutopilotLimits, Hull, required_margin
+from companion.boat.margins import Margin, MarginPart
 
 
 def names(margin):
@@ -28,6 +29,12 @@ def test_without_a_corridor_the_beat_has_no_bound():
     assert not margin.is_bounded
     assert "no bound" in margin.describe()
     assert required_margin(AutopilotLimits(sail_xtrack_max_m=0.0), speed_mps=2.0, legs_can_enter_no_go=False).is_bounded
+
+
+def test_the_total_is_the_sum_of_the_parts_that_are_told():
+    """ "14.5 m = hull 0.5 + position 2.5 + corridor 11.4"."""
+    parts = tuple(MarginPart(name=name, value_m=value, why="") for name, value in (("hull", 0.54), ("corridor", 11.44)))
+    assert Margin(parts=parts).describe() == "11.9 m = hull 0.5 + corridor 11.4"
 
 
 def test_parameters_by_their_ardupilot_names():

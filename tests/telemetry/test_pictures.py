@@ -231,6 +231,9 @@ def test_the_report_tells_the_voyage_and_writes_its_track(sailed, tmp_path, caps
     )
     assert cli.main(["report", str(sailed), "--track", str(tracks[0])]) == 2  # not without --force
     assert cli.main(["report", str(sailed), "--track", str(tmp_path / "t.wkt")]) == 2
+    (tmp_path / "mine.png").write_text("hello")
+    assert cli.main(["report", str(sailed), "--out", str(tmp_path / "mine.png")]) == 2
+    assert (tmp_path / "mine.png").read_text() == "hello"
 
 
 def test_all_voyages_are_reported_and_what_lies_among_them_is_passed_over(sailed, tmp_path, capsys):
