@@ -219,6 +219,10 @@ function down(at, _en, event) {
   return true;
 }
 
+export function isDragging() {
+  return drag !== null;
+}
+
 /** @param {Point} _at @param {Point} en */
 function move(_at, en) {
   if (drag) editor.draft(moved(drag.from, drag.ref, toPlace(editor.frame(), en)));

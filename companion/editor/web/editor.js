@@ -3,7 +3,7 @@ import * as chart from "./chart.js";
 import { el, get, renew, set, table } from "./dom.js";
 import { bearing, distance, duration, percent, speedUnit, units } from "./format.js";
 import * as map from "./map.js";
-import { called, degrees, History, middle, placeOf, places, removed, ringEn, toEn } from "./sketch.js";
+import { called, degrees, History, middle, placeOf, places, removed, ringEn, same, toEn } from "./sketch.js";
 import * as tables from "./tables.js";
 import * as water from "./water.js";
 
@@ -234,7 +234,7 @@ async function save(isForced = false) {
   const { status, found: told } = await post("/api/save", { sketch, disk, from_deg: Number(input("windfrom").value) || 0, is_forced: isForced });
   busy -= 1;
   if (status === 200) {
-    const isSame = history.now === sketch;
+    const isSame = history.now === sketch && !chart.isDragging();   // what is dragged is of the sketch before
     take(told, isSame);
     chart.hint(`${told.said}.`);
   } else if (status === 409) {
@@ -243,17 +243,22 @@ async function save(isForced = false) {
   marks();
 }
 
-/** Another state of the file: of its sketch the keys are new. @param {State} told @param {boolean} isSame */
+/** Another state of the file: of its sketch the keys are new, and the order of its shapes. @param {State} told @param {boolean} isSame */
 function take(told, isSame) {
   state = { ...told, frame: state?.frame ?? told.frame };
   disk = told.disk;
-  if (isSame) { history.past = [...history.past, history.now]; history.now = told.sketch; history.past.pop(); }
+  if (isSame) {
+    selected = same(history.now, selected, told.sketch);
+    draft = null;
+    history.now = told.sketch;
+  }
   saved = JSON.stringify(told.sketch);
   tables.about(told.files, told.kept);
   set(get("name"), { title: `${told.folder}/${told.file}` });
   get("name").textContent = told.file;
   document.title = `${told.file}: mission editor`;
   tables.show();
+  show();
   marks();
 }
 
@@ -440,7 +445,10 @@ function exporting() {
 // ------------------------------------------------------------------------------------------------------ the page
 function undo(isRedo = false) {
   if (draft) draft = null;
-  if (isRedo ? history.redo() : history.undo()) changed();
+  const before = history.now;
+  if (!(isRedo ? history.redo() : history.undo())) return;
+  selected = same(before, selected, history.now);
+  changed();
 }
 
 /** @type {[string, string][]} */

@@ -159,6 +159,37 @@ export function changed(sketch, ref, values) {
   return { ...sketch, [list]: /** @type {any[]} */ (sketch[list]).map((one, m) => (m === ref.n ? { ...one, ...values } : one)) };
 }
 
+/** What a thing is made of, without its name and where it is written. @param {Shape | Goal | Refuge} one */
+function made(one) {
+  const { name: _, key: _key, of: _of, ...rest } = /** @type {Record<string, any>} */ (one);
+  const of = ["kind", "type", "zone", "rings", "at", "port_mark", "starboard_mark", "ring", "polygon"];
+  return JSON.stringify(of.map((part) => rest[part] ?? null));
+}
+
+/** How many corners each of its rings has. @param {any} one */
+function counts(one) {
+  return JSON.stringify((one.rings ?? [one.ring ?? []]).map((/** @type {Place[]} */ ring) => ring.length));
+}
+
+/** The same thing in another sketch, where it may have another number: it lies where it lay, or has its key in the same
+ * files. Null: it is not there, or cannot be told. @param {Sketch} before @param {Ref | null} ref @param {Sketch} after @returns {Ref | null} */
+export function same(before, ref, after) {
+  if (ref === null || ref.of === "start") return after.start ? ref : null;
+  const list = ref.of === "goal" ? "goals" : ref.of === "refuge" ? "refuges" : "shapes";
+  const old = /** @type {any[]} */ (before[list]), now = /** @type {any[]} */ (after[list]), one = old[ref.n];
+  if (!one) return null;
+  const numbers = (/** @type {(other: any) => boolean} */ is) => now.flatMap((other, n) => (is(other) ? [n] : []));
+  const words = made(one), alike = numbers((other) => made(other) === words), named = alike.filter((n) => (now[n].name ?? "") === (one.name ?? ""));
+  const found = named.length ? named : alike;
+  if (found.length) return found.length === 1 ? { ...ref, n: found[0] ?? 0 } : found.includes(ref.n) ? ref : null;
+  if (before.revision !== after.revision) return null;
+  // it was moved between the two: what is in the files has its key, what is new its place in the list
+  const key = one.key ?? null;
+  const [n, ...more] = key !== null ? numbers((other) => other.key === key && other.of === one.of) : old.length === now.length && (now[ref.n].key ?? null) === null ? [ref.n] : [];
+  if (n === undefined || more.length) return null;
+  return counts(now[n]) === counts(one) ? { ...ref, n } : { of: ref.of, n };
+}
+
 /** Every place of a sketch, to show them all. @param {Sketch} sketch @returns {Place[]} */
 export function places(sketch) {
   /** @type {(Place | null | undefined)[]} */

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { called, changed, degrees, distanceTo, History, inserted, middle, moved, placeOf, places, removed, reordered, toEn, toPlace, within, withGoal } from "../../../companion/editor/web/sketch.js";
+import { called, changed, degrees, distanceTo, History, inserted, middle, moved, placeOf, places, removed, reordered, same, toEn, toPlace, within, withGoal } from "../../../companion/editor/web/sketch.js";
 
 const FRAME = { lat: 50.817, lon: -1.31, lat_m: 111250, lon_m: 70450 };
 const empty = () => ({ revision: "r", name: "m", start: null, goals: [], refuges: [], shapes: [], margin_m: 12, margin_floor_m: 6, point_radius_m: 10, end: "loiter", laps: 1 });
@@ -73,6 +73,33 @@ test("what is undone is as it was, and is done again", () => {
   history.undo();
   history.take({ ...empty(), laps: 2 });
   assert.equal(history.redo(), false);
+});
+
+test("a thing is the same one in another sketch, or none where it cannot be told", () => {
+  const put = (lat, values) => ({ type: "polygon", zone: "exclusion", rings: [[[lat, 0], [lat, 1], [lat + 1, 1]]], ...values });
+  const sketch = (revision, shapes, goals = []) => ({ ...empty(), revision, shapes, goals });
+  const shape = (n, values) => ({ of: "shape", n, ...values });
+  const before = sketch("a", [put(0, { of: "a.wkt", key: 0 }), put(2, { of: "f.wkt", key: 0, zone: "inclusion" }), put(4, { name: "Otter (north)" })]);
+  const after = sketch("b", [put(0, { of: "a.wkt", key: 0 }), put(4, { of: "a.wkt", key: 1, name: "Otter north", radius_m: null }), put(2, { of: "f.wkt", key: 0, zone: "inclusion" })]);
+  assert.deepEqual([0, 1, 2].map((n) => same(before, shape(n), after)?.n), [0, 2, 1]);
+  assert.deepEqual(same(before, shape(2, { ring: 0, v: 1 }), after), shape(1, { ring: 0, v: 1 }));
+  assert.equal(same(before, shape(2), sketch("b", after.shapes.slice(2))), null);
+  assert.equal(same(before, null, after), null);
+  // of two that lie alike the one with its name; where they have the same one, it cannot be told
+  const twins = (name) => sketch("b", [put(0), put(4, { name: "Otter (north)" }), put(4, { name })]);
+  assert.equal(same(before, shape(2), twins("Heron"))?.n, 1);
+  assert.equal(same(sketch("a", [put(4), put(0)]), shape(0), sketch("b", [put(0), put(4), put(4)])), null);
+  // moved between the two, in the same files: by its key; new: by its place in the list; with another count of corners as a whole
+  assert.deepEqual(same(before, shape(1, { ring: 0, v: 1 }), moved(before, shape(1), [9, 9])), shape(1, { ring: 0, v: 1 }));
+  assert.deepEqual(same(before, shape(2), moved(before, shape(2), [9, 9])), shape(2));
+  assert.deepEqual(same(before, shape(2, { ring: 0, v: 1 }), inserted(before, shape(2, { ring: 0, v: 1 }), [9, 9])), shape(2));
+  assert.equal(same(before, shape(2), moved(removed(before, shape(0)), shape(1), [9, 9])), null);
+  assert.equal(same(before, shape(2), { ...moved(before, shape(2), [9, 9]), revision: "b" }), null);
+  // a course may round one mark twice: its goals have an order
+  const mark = { kind: "point", at: [1, 1] }, course = [mark, { kind: "point", at: [2, 2] }, mark];
+  assert.deepEqual(same(sketch("a", [], course), { of: "goal", n: 2 }, sketch("b", [], course)), { of: "goal", n: 2 });
+  assert.deepEqual(same(sketch("a", [], course), { of: "goal", n: 1 }, reordered(sketch("a", [], course), 1, -1)), { of: "goal", n: 0 });
+  assert.equal(same(full(), { of: "start", n: 0 }, empty()), null);
 });
 
 test("within and near", () => {
