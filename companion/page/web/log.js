@@ -10,6 +10,8 @@ const LOUD = new Set(["critical", "error", "warning", "notice"]);
 /** @type {LogEvent[]} */
 let events = [];
 let shown = "";
+/** Unix time of the voyage's time 0 [s]. @type {number | null} */
+let began = null;
 /** @type {((t_s: number) => void) | null} */
 let jumps = null;
 
@@ -38,15 +40,21 @@ export function onJump(jump) {
   jumps = jump;
 }
 
-/** Show what has happened up to a time. @param {number} t_s */
-export function show(t_s) {
+/** Show what has happened up to a time, each line by the clock of now: what was said before the autopilot's was known too.
+ * @param {number} t_s @param {number | null} [unix_s] of the same moment */
+export function show(t_s, unix_s = null) {
   const everything = /** @type {HTMLInputElement} */ (get("everything")).checked;
   const wanted = events.filter((e) => e.t_s <= t_s + 0.05 && (everything || isDecision(e))).slice(-MOST);
+  const zero = unix_s === null ? null : unix_s - t_s;
+  if (zero === null || began === null || Math.abs(zero - began) >= 1) {    // a clock that is set is told by seconds
+    if (zero !== began) shown = "";
+    began = zero;
+  }
   const key = `${everything} ${wanted[0]?.number} ${wanted[wanted.length - 1]?.number} ${wanted.length}`;
   if (key === shown) return;
   shown = key;
   get("log").replaceChildren(...wanted.reverse().map((event) => {
-    const time = clock(event.unix_s, event.t_s);
+    const time = clock(began === null ? null : began + event.t_s, event.t_s);
     const head = [jumps === null ? el("time", {}, time) : button(time, event.t_s), el("strong", {}, event.title)];
     const facts = event.facts.map(([name, value]) => el("span", {}, el("i", {}, name), ` ${value}`));
     return el("li", { class: `${event.kind} ${event.level}` }, el("div", { class: "head" }, ...head), ...(event.text ? [el("p", {}, event.text)] : []), ...(facts.length ? [el("p", { class: "numbers" }, ...facts)] : []));

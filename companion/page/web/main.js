@@ -29,7 +29,7 @@ function show() {
   strips.show(view, past, view?.plan?.margin_m ?? area?.margin_m ?? null, other);
   polar.show(view, past);
   orders.show(view);
-  log.show(view?.t_s ?? -Infinity);
+  log.show(view?.t_s ?? -Infinity, view?.unix_s);
   if (view) page.timeline?.words(view);
   old();
 }
