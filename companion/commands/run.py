@@ -416,17 +416,24 @@ def _voyage(
             token=secrets.randbelow(0xFFFFFFFF) + 1,
         )
 
+    ending = SignalEnding()
     summary = run_loop(
-        _sail(mission, transport, folder, options, manager, fork_server, out, told, guard), speedup=args.speedup
+        _sail(mission, transport, folder, options, manager, fork_server, out, told, guard, ending), speedup=args.speedup
     )
     code, text = outcome_of(mission.name, summary)
     out.write(f"{text}\n{folder}\n")  # before the picture: whatever ends its drawing, how the voyage ended is told
-    # the next voyage waits for no picture, and where nobody was heard there is nothing to draw
-    if summary["time_s"] is not None and not summary["arrived_before"] and summary["end_reason"] != ADOPTED:
-        if fork_server is not None:
-            fork_server.close()  # there is nothing more to plan, and to draw takes more memory than to sail
-        _report(folder, err)
-    return None if summary["end_reason"] == ADOPTED else code
+    if summary["end_reason"] == ADOPTED:  # the next voyage waits for no picture
+        ending.at_once()
+        return None
+    if summary["time_s"] is not None and not summary["arrived_before"]:  # nobody was heard: nothing to draw
+        try:
+            ending.at_once()
+            if fork_server is not None:
+                fork_server.close()  # there is nothing more to plan, and to draw takes more memory than to sail
+            _report(folder, err)
+        except KeyboardInterrupt:
+            err.write("companion run: the picture is not drawn; companion report draws it\n")
+    return code
 
 
 def _how_arrived(goals: int, given_up: int) -> str:
@@ -471,12 +478,12 @@ async def _sail(
     out: Console,
     told: Displays,
     guard: Guard,
+    ending: SignalEnding,
 ) -> dict[str, Any]:
     """Sail; return the summary. Raises KeyboardInterrupt: it was ended before it began, or a second time."""
     from companion.kernels.memory import settle
     from companion.planner.worker import PlannerWorker
 
-    ending = SignalEnding()
     async with PlannerWorker(algorithm=mission.skipper.planner, fork_server=fork_server) as planner:
         # The child loads its kernels while this process imports the rest.
         from companion.app.sail import sail
@@ -554,23 +561,34 @@ def epoch_of(folder: Path, speedup: float, unix_s: float, monotonic_s: float) ->
 class SignalEnding:
     """How SIGINT and SIGTERM end a voyage: before it is begun, and when they come again, at once.
 
-    Handlers of the event loop would wait for its turn, which comes late while libraries are loaded.
+    Handlers of the event loop would wait for its turn, which comes late while libraries are loaded. From the end of the
+    loop they wait for ``at_once``: how the voyage ended is told first.
     """
 
     def __init__(self) -> None:
-        self._loop = asyncio.get_running_loop()
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._stop: asyncio.Event | None = None
+        self._came_late = False
         for end in (signal.SIGINT, signal.SIGTERM):
             signal.signal(end, self._on_signal)
 
     def asked(self) -> asyncio.Event:
         """Return what is set by the first signal from now on: a voyage is brought to its end and told of."""
-        self._stop = asyncio.Event()
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
         return self._stop
+
+    def at_once(self) -> None:
+        """Let what comes from now on raise KeyboardInterrupt. Raises it: one has come since the end of the loop."""
+        self._loop = self._stop = None
+        if self._came_late:
+            raise KeyboardInterrupt
 
     def _on_signal(self, number: int, frame: object) -> None:
         del number, frame
-        if self._stop is None:
+        if self._loop is not None and self._loop.is_closed():
+            self._came_late = True
+            return
+        if self._loop is None or self._stop is None:
             raise KeyboardInterrupt
         stop, self._stop = self._stop, None
         self._loop.call_soon_threadsafe(stop.set)
@@ -583,8 +601,6 @@ def _report(folder: Path, err: Console) -> None:
         from companion.telemetry.folder import PICTURE, read_voyage
 
         plot_voyage(read_voyage(folder), folder / PICTURE)
-    except KeyboardInterrupt:
-        err.write("companion run: the picture is not drawn; companion report draws it\n")
     except Exception as error:
         refusal: Exception | None = error if isinstance(error, CompanionError) else None
         if isinstance(error, ModuleNotFoundError):

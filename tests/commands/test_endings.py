@@ -75,35 +75,66 @@ def test_a_signal_ends_what_is_not_begun_stops_a_voyage_and_ends_it_the_second_t
             signal.signal(number, handler)
 
 
+async def arrived(*given):
+    """Sail to the goal, in place of ``run._sail``; a signal would stop the voyage, as it is told to it last."""
+    given[-1].asked()
+    counts = dict.fromkeys(("plans", "uploads", "tacks", "replans"), 1)
+    reached = {"goals": 1, "goals_given_up": 0, "records_dropped": 0, "end_reason": "arrived", "time_s": 60.0}
+    return {"arrived": True, "arrived_before": False, **reached, **counts}
+
+
+def run_of(folder):
+    """Return the command line of a voyage in ``folder``, where its mission is written."""
+    (folder / "a.toml").write_text(MISSION)
+    link = f"udpin:127.0.0.1:{free_port()}"
+    return ["run", str(folder / "a.toml"), "--link", link, "--out", str(folder / "v")]
+
+
 def test_how_a_voyage_ended_is_told_before_its_picture_is_drawn(tmp_path, monkeypatch):
     """What ended the drawing left it untold, and a fork server was there for planners of which none was to come."""
-    (tmp_path / "a.toml").write_text(MISSION)
     happened = []
 
     class Spare:
         def close(self):
             happened.append("fork server ended")
 
-    async def sailed(*_):
-        counts = dict.fromkeys(("plans", "uploads", "tacks", "replans"), 1)
-        reached = {"goals": 1, "goals_given_up": 0, "records_dropped": 0, "end_reason": "arrived", "time_s": 60.0}
-        return {"arrived": True, "arrived_before": False, **reached, **counts}
-
     monkeypatch.setattr(ForkServer, "begin", lambda _: Spare())
-    monkeypatch.setattr(run, "_sail", sailed)
+    monkeypatch.setattr(run, "_sail", arrived)
     monkeypatch.setattr(run, "_report", lambda *_: happened.append("picture"))
     monkeypatch.setattr(Console, "write", lambda _, text: happened.append(text.partition(";")[0]))
-    command = [
-        "run",
-        str(tmp_path / "a.toml"),
-        "--link",
-        f"udpin:127.0.0.1:{free_port()}",
-        "--out",
-        str(tmp_path / "v"),
-    ]
-    assert cli.main(command) == 0
+    assert cli.main(run_of(tmp_path)) == 0
     told = happened.index("arrived")
     assert happened[told + 1 : told + 3] == ["fork server ended", "picture"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("where", ["told", "drawn"])
+def test_a_signal_after_a_voyage_has_ended_by_itself_costs_its_picture_and_nothing_else(
+    number, where, tmp_path, monkeypatch
+):
+    """It was told as "the picture could not be drawn: RuntimeError('Event loop is closed')", or was a traceback."""
+    drawn, outcome_of = [], run.outcome_of
+
+    def told(*given):
+        if where == "told":
+            signal.raise_signal(number)
+        return outcome_of(*given)
+
+    def plotted(*_):
+        signal.raise_signal(number)
+        drawn.append(True)
+
+    monkeypatch.setattr(ForkServer, "begin", lambda _: None)
+    monkeypatch.setattr(run, "_sail", arrived)
+    monkeypatch.setattr(run, "outcome_of", told)
+    monkeypatch.setattr("companion.plots.voyage.plot_voyage", plotted)
+    monkeypatch.setattr("companion.telemetry.folder.read_voyage", lambda folder: folder)
+    said = []
+    monkeypatch.setattr(Console, "write", lambda _, text: said.append(text))
+    assert cli.main(run_of(tmp_path)) == 0
+    assert said[-1] == "companion run: the picture is not drawn; companion report draws it\n"
+    assert [text.partition(";")[0] for text in said[-2:-1]] == ["arrived"]
+    assert not drawn
 
 
 def test_run_on_a_link_where_nobody_answers_ends_when_it_is_told_to(tmp_path):
