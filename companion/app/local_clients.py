@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
-import itertools
 import json
 import socket
 from collections import deque
@@ -91,7 +90,7 @@ class OperatorCommands:
     async def ask(self, wanted: Wanted, number: int, way: str = LOCAL) -> Answer:
         """Give an order that comes on another way than the link, and return its answer.
 
-        ``number`` is its own among those that wait: of the connection on board, of the order from far away.
+        ``number`` is the station's on that way: ``SOCKET`` or ``BROWSERS`` on board, from far away the order's own.
         """
         if not self._is_open:
             return Answer(result=Result.NOT_NOW, text="the companion is not under way yet")
@@ -186,9 +185,9 @@ class ViewBroadcast:
             self._guard.call(Auxiliary.VIEW, functools.partial(watcher, view, events, step))
 
 
-# All browsers are one station: an order that is sent twice in haste is done once. No connection of the socket on
-# board has this number.
-BROWSERS = 1_000_000
+# All browsers are one station, and all who open the socket are another: an order that is sent twice in haste is done
+# once, and ``companion order`` opens a connection for each. Answers come in the order in which a station asked.
+SOCKET, BROWSERS = 1, 2
 PREVIEW_S = 0.5  # for a plan that is only looked at: the boat's own may have to wait for it so long
 LAST_S = 5.0  # for one that is being made when the voyage ends
 
@@ -326,11 +325,9 @@ async def orders_served(path: Path, operator: OperatorCommands, views: ViewBroad
         InputError: another program listens there, something else is there, or it cannot be made.
     """
     _clear(path)
-    numbers = itertools.count(1)
     guests, watching = Guests(MOST), set[asyncio.StreamWriter]()
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        number = next(numbers)
         try:
             # gone, a line without end, or the service ends, of which asyncio would tell as of an error
             with contextlib.suppress(ConnectionError, ValueError, TimeoutError, asyncio.CancelledError):
@@ -341,7 +338,7 @@ async def orders_served(path: Path, operator: OperatorCommands, views: ViewBroad
                             watching.add(writer)
                             await _show(writer, views)
                         break
-                    answer = await _answer(line, operator, number)
+                    answer = await _answer(line, operator)
                     writer.write(json.dumps({"result": answer.result.value, "text": answer.text}).encode() + b"\n")
                     async with asyncio.timeout(STUCK_S):
                         await writer.drain()
@@ -412,8 +409,8 @@ def _clear(path: Path) -> None:
     raise InputError("--socket", str(path), "another program listens there", "name another place, or end that one")
 
 
-async def _answer(line: bytes, operator: OperatorCommands, number: int) -> Answer:
+async def _answer(line: bytes, operator: OperatorCommands) -> Answer:
     try:
-        return await operator.ask(phrase(line.decode("utf-8").split()), number)
+        return await operator.ask(phrase(line.decode("utf-8").split()), SOCKET)
     except (InputError, UnicodeDecodeError) as error:
         return Answer(result=Result.UNKNOWN, text=str(error))

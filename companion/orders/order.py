@@ -253,7 +253,7 @@ class Wanted:
 class Source:
     """Who asked: on which way, and with which ids.
 
-    ``local``: over the socket on board, each connection its own. ``far``: by satellite, each counter its own.
+    ``local``: on board, all at the socket one and all browsers another. ``far``: by satellite, each counter its own.
     """
 
     kind: str

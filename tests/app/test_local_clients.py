@@ -19,8 +19,11 @@ from companion.guard import Guard
 from companion.mavlink.link import Link
 from companion.orders import Result, Verb
 from companion.skipper.step import Acknowledge
+from companion.skipper.step.config import ALL_PERMITTED
+from companion.skipper.way.voyage import Goal
 from companion.view import Event, View
 from sitl.autopilot import MemoryLink
+from tests.skipper.test_voyage import make
 from tests.terminal.test_dashboard import VIEW
 
 
@@ -76,6 +79,32 @@ def test_who_watches_when_the_companion_ends_is_no_error(tmp_path):
     assert not errors
 
 
+def test_the_same_order_over_another_connection_is_a_repetition_and_each_gets_its_answer(tmp_path):
+    """``companion order skip_goal --socket`` twice in a second gave two goals up."""
+    goals = [Goal(en_m=en_m) for en_m in ((0.0, 300.0), (250.0, 300.0), (250.0, 0.0))]
+    world = make(*goals, obstacles=(), permissions=replace(ALL_PERMITTED, local_orders=("skip_goal",)))
+    world.run(5)
+
+    async def talk(operator):
+        async def given(words):
+            asked, orders, seen = asyncio.create_task(said(tmp_path / "s", words)), [], len(world.actions)
+            while not orders:
+                await asyncio.sleep(0.01)
+                orders = operator.take()
+            world.events += orders
+            world.step()
+            for _, action in world.actions[seen:]:
+                if isinstance(action, Acknowledge):
+                    operator.answered(action)
+            return json.loads((await asked)[0])
+
+        first, again = await given(b"skip_goal\n"), await given(b"skip_goal\n")
+        assert (first["result"], again) == ("done", first)
+        assert world.state.progress.gate == 1
+
+    with_socket(tmp_path / "s", talk)
+
+
 def test_an_order_waits_for_its_answer_and_only_for_its_own(tmp_path):
     async def talk(operator):
         first = asyncio.create_task(said(tmp_path / "s", b"hold\n"))
@@ -86,7 +115,7 @@ def test_an_order_waits_for_its_answer_and_only_for_its_own(tmp_path):
             orders += operator.take()
         assert {o.wanted.verb for o in orders} == {Verb.HOLD, Verb.GOAL}
         assert {(o.source.kind, o.authority) for o in orders} == {("local", "local")}
-        for order in reversed(orders):
+        for order in orders:
             operator.answered(
                 Acknowledge(
                     way="local",
