@@ -185,6 +185,7 @@ class CompileProgress:
 PLAIN_EVERY_S = 15.0
 SILENT_S = 5.0  # without a heartbeat
 LOUD = Severity.NOTICE  # what is said more quietly than this is in the records only
+BACK_S = 60.0  # what lies so far behind the time that was told last is another clock's, and is said
 COLUMNS_MOST = 120  # longer lines are hard to read
 DISK = "disk"  # the alert of trouble with the disk, which no state of the voyage tells
 GONE = "gone"  # ... and of what is gone beside it: a page, a socket, an output
@@ -203,6 +204,7 @@ class ProgressLine:
         self._standing = 0  # lines that are rewritten
         self._notes: list[str] = []  # to be said with the next step
         self._behind_s: float | None = None  # our clock's, against the autopilot's; None: no time was told yet
+        self._told_s = -math.inf  # the Unix time that was told last
 
     def __enter__(self) -> Self:
         return self
@@ -250,18 +252,24 @@ class ProgressLine:
             self._stream.flush()
 
     def _clock(self, snapshot: Snapshot) -> tuple[list[str], str]:
-        """Return the time of day, the page's, and a line where it turns from one clock to the other."""
+        """Return the time of day, the page's, and a line where it turns from one clock to another.
+
+        It never goes back otherwise: a frame that is read late, as under load, tells of an earlier time than the one
+        before it did.
+        """
         unix_s, boat_s = self._epoch_s + snapshot.t_s, snapshot.unix_s(snapshot.t_s)
         before_s, lines = self._behind_s, []
         if boat_s is not None and abs(boat_s - unix_s) >= CLOCK_OFF_S:
             self._behind_s = boat_s - unix_s
-            if before_s == 0.0:
+            if before_s == 0.0 or boat_s < self._told_s - BACK_S:
+                self._told_s = boat_s
                 lines.append(
                     f"it is {datetime.fromtimestamp(boat_s, UTC):%Y-%m-%d %H:%M:%S} UTC by the autopilot's clock"
                 )
         elif before_s is None:
             self._behind_s = 0.0
-        return lines, datetime.fromtimestamp(unix_s + (self._behind_s or 0.0), UTC).strftime("%H:%M:%S")
+        self._told_s = max(self._told_s, unix_s + (self._behind_s or 0.0))
+        return lines, datetime.fromtimestamp(self._told_s, UTC).strftime("%H:%M:%S")
 
 
 def _said(clock: str, announced: Announce) -> str:

@@ -287,6 +287,22 @@ def test_where_times_turn_to_the_autopilots_clock_that_is_said_and_they_never_tu
     ]
 
 
+@pytest.mark.parametrize(("late_s", "told"), [(8.0, "03:00:01"), (3_000.0, "02:10:02")])
+def test_a_frame_that_is_read_late_turns_no_clock_back_and_another_time_of_the_autopilots_is_said(steps, late_s, told):
+    """Under load "08:57:54 STANDARD ..." stood above "08:57:52 ERROR: position lost"."""
+    stream = io.StringIO()
+    said = (Announce(severity=Severity.WARNING, code="x", text="so it is"),)
+    with ProgressLine(stream, epoch_s=3_600.0) as progress:
+        for n, step in enumerate(steps):
+            boot_s = n - late_s if n == 2 else float(n)
+            autopilot = replace(step.snapshot.autopilot, t_s=float(n), boot_s=boot_s, utc_at_boot_s=10_800.0)
+            snapshot = replace(step.snapshot, t_s=float(n), autopilot=autopilot)
+            progress.show(STATUS, replace(step, snapshot=snapshot, actions=said))
+    lines = stream.getvalue().splitlines()
+    assert [line[:8] for line in lines if "WARNING" in line] == ["03:00:00", "03:00:01", told]
+    assert ("it is 1970-01-01 02:10:02 UTC by the autopilot's clock" in lines) == (late_s > 60.0)
+
+
 def test_what_is_left_behind_is_said_with_where_she_will_end():
     world = World(Skipper(voyage=voyage(), config=SkipperConfig()))
     made = world.skipper.voyage
