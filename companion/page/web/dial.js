@@ -1,5 +1,5 @@
 // The wind dial: the boat's bow up, the wind on it, where she cannot sail now and later, the laylines, the shifts lately.
-import { picture, renew, set, sketch } from "./dom.js";
+import { picture, renew, set, sketch, slots } from "./dom.js";
 import { bearing, bearingUnit, NONE, speed, speedUnit, units } from "./format.js";
 import { onDial, path, sector, wrap } from "./geometry.js";
 
@@ -26,13 +26,11 @@ export function show(view, past) {
     out.push(sketch("path", { class: `swing ${line.tack}`, d: sector(at - line.swing_deg, at + line.swing_deg, FACE - 10, FACE) }),
       sketch("path", { class: `lay ${line.tack}`, d: path([onDial(at, 34), onDial(at, FACE)]) }));
   }
-  for (let degrees = 0; degrees < 360; degrees += 10) {
-    const at = degrees + off - up, is = degrees % 30 === 0;
-    out.push(sketch("path", { class: is ? "tick major" : "tick", d: path([onDial(at, RIM), onDial(at, RIM - (is ? 9 : 5))]) }));
-    if (is) {
-      const [x, y] = onDial(at, RIM - 17);
-      out.push(sketch("text", { x, y: y + 4, class: degrees % 90 ? "rose" : "rose main" }, { 0: "N", 90: "E", 180: "S", 270: "W" }[degrees] ?? String(degrees)));
-    }
+  // what stands still on the water turns as one, and what is written in it stays
+  out.push(sketch("g", { transform: `rotate(${off - up})` }, sketch("path", { class: "tick", d: ticks((degrees) => degrees % 30 !== 0, 5) }), sketch("path", { class: "tick major", d: ticks((degrees) => degrees % 30 === 0, 9) })));
+  for (let degrees = 0; degrees < 360; degrees += 30) {
+    const [x, y] = onDial(degrees + off - up, RIM - 17);
+    out.push(sketch("text", { x, y: y + 4, class: degrees % 90 ? "rose" : "rose main" }, { 0: "N", 90: "E", 180: "S", 270: "W" }[degrees] ?? String(degrees)));
   }
   out.push(...shifts(view, past, up));
   const goal = view?.goals.find((g) => g.is_next);
@@ -73,22 +71,31 @@ function corner(x, y, anchor, name, value, unit) {
     sketch("text", { x, y: top ? y + 20 : y - 3, class: "cornervalue", "text-anchor": anchor }, value + (unit && value !== NONE ? ` ${unit}` : ""))];
 }
 
+/** @param {(degrees: number) => boolean} which @param {number} long */
+function ticks(which, long) {
+  let d = "";
+  for (let degrees = 0; degrees < 360; degrees += 10) if (which(degrees)) d += path([onDial(degrees, RIM), onDial(degrees, RIM - long)]);
+  return d;
+}
+
 /** Where the wind was lately: dots that fade, and the arc between its limits. @param {View | null} view @param {Past | null} past @param {number} up */
 function shifts(view, past, up) {
   if (!view || !past || view.wind?.twd_from_deg == null) return [];
   const middle = view.wind.twd_from_deg;
   let low = 0, high = 0;
-  const dots = [];
-  for (let n = 0; n < past.t_s.length; n++) {
+  /** @type {Map<number, import("./dom.js").Sketch>} */
+  const dots = new Map();
+  for (let n = past.t_s.length - 1; n >= 0; n--) {
     const ago = view.t_s - (past.t_s[n] ?? 0), twd = past.twd_from_deg[n];
-    if (ago < 0 || ago > LATELY_S || twd === null || twd === undefined) continue;
+    if (ago > LATELY_S) break;
+    if (ago < 0 || twd === null || twd === undefined) continue;
     const off = wrap(twd - middle);
     low = Math.min(low, off);
     high = Math.max(high, off);
     if (n % 6 === 0) {
-      const [x, y] = onDial(twd - up, RIM + 2);
-      dots.push(sketch("circle", { cx: x, cy: y, r: 1.6, class: "shift", opacity: (1 - 0.85 * ago / LATELY_S).toFixed(2) }));
+      const [cx, cy] = onDial(twd, RIM + 2);
+      dots.set(n / 6, sketch("circle", { cx, cy, r: 1.6, class: "shift", "fill-opacity": (1 - 0.85 * ago / LATELY_S).toFixed(2) }));
     }
   }
-  return [sketch("path", { class: "limits", d: sector(middle + low - up, middle + high - up, RIM, RIM + 4) }), ...dots];
+  return [sketch("path", { class: "limits", d: sector(middle + low - up, middle + high - up, RIM, RIM + 4) }), sketch("g", { transform: `rotate(${-up})` }, ...slots(dots))];
 }

@@ -29,6 +29,17 @@ export function sketch(name, attributes = {}, ...children) {
   return { name, attributes, children };
 }
 
+const EMPTY = sketch("circle");
+
+/** Children by their numbers, each in a place that it keeps while others come and go: the places are taken in turn.
+ * @param {Map<number, Sketch>} numbered circles, the numbers near each other @returns {Sketch[]} */
+export function slots(numbered) {
+  const numbers = [...numbered.keys()], span = numbers.length ? Math.max(...numbers) - Math.min(...numbers) + 1 : 0;
+  const out = Array.from({ length: 64 * Math.ceil(span / 64) }, () => EMPTY);
+  for (const [n, one] of numbered) out[n % out.length] = one;
+  return out;
+}
+
 /** @type {WeakMap<Element, {children: readonly (Sketch | string)[], nodes: (Element | Text)[]}>} what ``renew`` has made of a parent */
 const made = new WeakMap();
 

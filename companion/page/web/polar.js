@@ -1,11 +1,11 @@
 // The polar in the present wind, the boat's point and where it was lately, the best angles, the no-go zone.
-import { picture, renew, sketch } from "./dom.js";
+import { picture, renew, sketch, slots } from "./dom.js";
 import { figure, scaled, speed, speedUnit } from "./format.js";
 import { marks, onDial, path, sector } from "./geometry.js";
 
 /** @typedef {import("../../view/view").View} View @typedef {import("../../view/view").Past} Past @typedef {import("./geometry.js").Point} Point */
 
-const R = 108;
+const R = 108, LATELY_S = 300;
 const root = picture("polar");
 
 /** @param {View | null} view @param {Past | null} past */
@@ -40,12 +40,16 @@ export function show(view, past) {
       out.push(sketch("circle", { cx: x, cy: y, r: 3.4, class: "best" }));
     }
   }
-  if (past) for (let n = Math.max(0, past.t_s.length - 4000); n < past.t_s.length; n += 3) {
+  /** @type {Map<number, import("./dom.js").Sketch>} */
+  const dots = new Map();
+  for (let n = (past?.t_s.length ?? 0) - 1; past && n >= 0; n--) {
     const ago = view.t_s - (past.t_s[n] ?? 0), twa = past.polar_twa_deg[n], speed = past.polar_mps[n];
-    if (ago < 0 || ago > 300 || twa == null || speed == null) continue;
+    if (ago > LATELY_S) break;
+    if (n % 3 !== 0 || ago < 0 || twa == null || speed == null) continue;
     const [x, y] = onDial(twa, r(speed));
-    out.push(sketch("circle", { cx: x.toFixed(1), cy: y.toFixed(1), r: 1.7, class: "was", opacity: (0.75 - 0.65 * ago / 300).toFixed(2) }));
+    dots.set(n / 3, sketch("circle", { cx: x.toFixed(1), cy: y.toFixed(1), r: 1.7, class: "was", "fill-opacity": (0.75 - 0.65 * ago / LATELY_S).toFixed(2) }));
   }
+  out.push(sketch("g", {}, ...slots(dots)));
   let share = "";
   if (polar.live_twa_deg !== null && polar.live_mps !== null) {
     const [x, y] = onDial(polar.live_twa_deg, r(polar.live_mps));

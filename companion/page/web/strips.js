@@ -85,11 +85,13 @@ function strips(view, past, cut, now, margin) {
 /** @param {Strip} strip @param {number} top @param {number[]} t @param {(at: number) => number} x @param {number} now @param {number} width @param {number} begin */
 function draw(strip, top, t, x, now, width, begin) {
   const right = width - RIGHT;
-  const shown = strip.values.filter((v, n) => v !== null && (t[n] ?? 0) >= begin).map(Number);
-  const before = [...strip.low, ...strip.high].filter((v, n) => v !== null && (t[n % Math.max(1, strip.low.length)] ?? 0) >= begin - AHEAD_S).map(Number);
-  const bounds = [...shown, ...before, ...strip.ahead.filter((a) => x(a[0]) <= right).flatMap((a) => [a[1], a[2]]), ...(strip.line === null || shown.length === 0 || Math.min(...shown) > 3 * strip.line ? [] : [strip.line])];
-  let low = Math.min(...bounds), high = Math.max(...bounds);
-  if (bounds.length === 0) { low = 0; high = strip.least; }
+  let low = Infinity, high = -Infinity;
+  const bound = (/** @type {number | null | undefined} */ v) => { if (v != null) { low = Math.min(low, v); high = Math.max(high, v); } };
+  strip.values.forEach((v, n) => { if ((t[n] ?? 0) >= begin) bound(v); });
+  if (strip.line !== null && low <= 3 * strip.line) bound(strip.line);
+  for (const column of [strip.low, strip.high]) column.forEach((v, n) => { if ((t[n] ?? 0) >= begin - AHEAD_S) bound(v); });
+  for (const [at, from, to] of strip.ahead) if (x(at) <= right) { bound(from); bound(to); }
+  if (low > high) { low = 0; high = strip.least; }
   if (strip.floor !== null) low = Math.max(strip.floor, low);
   const lacks = Math.max(0, strip.least - (high - low)) / 2 + 0.06 * (high - low);
   low = strip.floor !== null ? Math.max(strip.floor, low - lacks) : low - lacks;

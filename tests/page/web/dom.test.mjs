@@ -18,7 +18,7 @@ class Node {
 }
 globalThis.document = { createElement: (name) => new Node(name), createElementNS: (space, name) => Object.assign(new Node(name), { namespaceURI: space }),
   createTextNode: (text) => Object.assign(new Node("text"), { text }) };
-const { renew, set, sketch } = await import("../../../companion/page/web/dom.js");
+const { renew, set, sketch, slots } = await import("../../../companion/page/web/dom.js");
 
 const told = (node) => node.name === "text" ? node.text : [node.name, node.attributes, ...node.nodes.map(told)];
 /** A parent with what is sketched, and what is written when it is sketched otherwise. */
@@ -77,4 +77,12 @@ test("an attribute that is set as it is already is not written", () => {
   assert.equal(writes.length, 2);
   set(node, { x: 2, is: false });
   assert.deepEqual(writes.slice(2), ["x=2", "-is"]);
+});
+
+test("of what comes at one end and goes at the other each keeps its place", () => {
+  const dots = (from, to) => slots(new Map(Array.from({ length: to - from }, (_, n) => [from + n, sketch("circle", { cx: from + n })])));
+  assert.deepEqual(dots(0, 0), []);
+  const { writes, is } = again(dots(100, 160), dots(102, 163));
+  assert.deepEqual(writes, ["cx=160", "cx=161", "cx=162", "-cx", "-cx"]);
+  assert.deepEqual(is.map(([, { cx }]) => cx).filter((cx) => cx !== undefined).map(Number).sort((a, b) => a - b), Array.from({ length: 61 }, (_, n) => 102 + n));
 });
