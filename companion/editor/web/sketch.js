@@ -159,11 +159,9 @@ export function changed(sketch, ref, values) {
   return { ...sketch, [list]: /** @type {any[]} */ (sketch[list]).map((one, m) => (m === ref.n ? { ...one, ...values } : one)) };
 }
 
-/** What a thing is made of, without its name and where it is written. @param {Shape | Goal | Refuge} one */
+/** What a thing is and where it lies: without its name, its numbers and where it is written. @param {Record<string, any>} one */
 function made(one) {
-  const { name: _, key: _key, of: _of, ...rest } = /** @type {Record<string, any>} */ (one);
-  const of = ["kind", "type", "zone", "rings", "at", "port_mark", "starboard_mark", "ring", "polygon"];
-  return JSON.stringify(of.map((part) => rest[part] ?? null));
+  return JSON.stringify(["kind", "type", "zone", "rings", "at", "port_mark", "starboard_mark", "ring", "polygon"].map((part) => one[part] ?? null));
 }
 
 /** How many corners each of its rings has. @param {any} one */
