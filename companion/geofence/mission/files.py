@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import msgspec
 
 from companion.geo.frame import LocalFrame
 from companion.geofence.area import Area, Fence
@@ -68,17 +71,46 @@ def goal_losses(mission: Mission) -> Losses:
             FindingLevel.WARNING,
             "of a field only the place where the mission leads meanwhile is carried by this format",
         )
-    plain = replace_defaults(mission.options)
-    if plain:
-        losses.add(FindingLevel.NOTE, f"the mission's own settings ({', '.join(plain)}) are not carried by this format")
+    if _says(mission.options.goal, "radius_m"):
+        losses.add(FindingLevel.WARNING, "the radius within which a goal is reached is not carried by this format")
+    if any(g.heading_deg is not None for g in mission.goals):
+        losses.add(FindingLevel.WARNING, "the heading that plans arrive at a goal with is not carried by this format")
+    if any(g.bandwidth_m is not None for g in mission.goals):
+        losses.add(FindingLevel.WARNING, "the width of the lane that leads to a goal is not carried by this format")
+    if mission.options.start is not None and _says((mission.options.start,), "heading_deg"):
+        losses.add(FindingLevel.NOTE, "the heading at the start is not carried by this format")
+    if any(refuge.name for refuge in mission.refuges):
+        losses.add(FindingLevel.NOTE, "the names of refuges are not carried by this format")
+    if _says(mission.options.refuge, "radius_m"):
+        losses.add(FindingLevel.WARNING, "the radius of a refuge is not carried by this format")
+    if mission.drying:
+        losses.add(FindingLevel.WARNING, "the water that dries is not carried by this format")
+    own = own_settings(mission.options)
+    if own:
+        losses.add(FindingLevel.NOTE, f"the mission's own settings ({', '.join(own)}) are not carried by this format")
     return losses
 
 
-def replace_defaults(options: MissionOptions) -> list[str]:
-    """Return the names of the tables that differ from their defaults."""
-    default = MissionOptions(goal=options.goal)
-    own = "field risk boat wind operator skipper planner passage safety traffic sounder"
-    return [t for t in own.split() if getattr(options, t) != getattr(default, t)]
+def _says(tables: Sequence[msgspec.Struct], key: str) -> bool:
+    """Return whether one of the tables has another value of ``key`` than its default, which a reader takes."""
+    fields = ((table, f) for table in tables for f in msgspec.structs.fields(table) if f.name == key)
+    return any(getattr(table, key) != f.default for table, f in fields)
+
+
+# What of a mission file a document holds itself, or where ``goal_losses`` has its own words for what it does not.
+_CARRIED = {"goal", "from_autopilot", "start", "refuge", "area"}
+_CARRIED_OF_AREA = {"obstacles", "fence", "axis", "point_radius_m", "drying"}
+
+
+def own_settings(options: MissionOptions) -> list[str]:
+    """Return the names of the keys and tables that differ from their defaults and that no document holds."""
+    default = MissionOptions()
+    named = [name for name in MissionOptions.__struct_fields__ if name not in _CARRIED]
+    of_area = [name for name in AreaOptions.__struct_fields__ if name not in _CARRIED_OF_AREA]
+    return [
+        *(name for name in named if getattr(options, name) != getattr(default, name)),
+        *(f"area.{name}" for name in of_area if getattr(options.area, name) != getattr(default.area, name)),
+    ]
 
 
 # Nothing is permitted by default; a new file names what could be.

@@ -211,6 +211,55 @@ def test_what_is_written_is_what_is_counted(capsys, tmp_path):
     assert "mission item" not in written  # they are not in it
 
 
+FULL = """
+name = "full"
+description = "all of it"
+[start]
+lat = 50.8170
+lon = -1.3100
+heading_deg = 90.0
+[[goal]]
+lat = 50.8203
+lon = -1.3101
+radius_m = 12.0
+bandwidth_m = 80.0
+heading_deg = 10.0
+[[refuge]]
+lat = 50.8180
+lon = -1.3100
+radius_m = 20.0
+name = "Cove"
+[area]
+margin_m = 14.0
+[current]
+set_deg = 90.0
+drift_mps = 0.1
+[output]
+nmea = ["udp:127.0.0.1:10110"]
+"""
+
+
+@pytest.mark.parametrize("ending", ["geojson", "gpx", "kml", "plan", "toml"])
+def test_what_of_a_mission_file_no_format_carries_is_said(capsys, tmp_path, ending):
+    """Of all this nothing was said, and of a plain mission nothing is."""
+    (tmp_path / "full.toml").write_text(FULL)
+    code, out, _ = run(capsys, "mission", "convert", tmp_path / "full.toml", tmp_path / f"out.{ending}")
+    assert code == 0
+    for lost in (
+        "warning: the radius within which a goal is reached is",
+        "warning: the heading that plans arrive at a goal with is",
+        "warning: the width of the lane that leads to a goal is",
+        "note: the heading at the start is",
+        "note: the names of refuges are",
+        "warning: the radius of a refuge is",
+        "note: the mission's own settings (name, description, current, output, area.margin_m) are",
+    ):
+        assert f"out.{ending}: {lost} not carried by this format\n" in out
+    (tmp_path / "plain.toml").write_text(f"[[goal]]\nlat = {HERE.split(',')[0]}\nlon = -1.31\n")
+    _, out, _ = run(capsys, "mission", "convert", tmp_path / "plain.toml", tmp_path / f"plain-out.{ending}")
+    assert "not carried" not in out
+
+
 @pytest.mark.parametrize(
     ("line", "choices"),
     [
