@@ -184,7 +184,7 @@ def save_mission(
     if refuges:
         handles.append(Line2D([], [], ls="", marker="P", color=GOAL, ms=8, mec="black", mew=0.6, label="refuge"))
     _finish(axes, extent, twd_from_rad, tws_mps, handles)
-    words = _words(mission, plans) + [
+    words = _words(mission, plans, tws_mps=tws_mps, twd_from_rad=twd_from_rad) + [
         f"{name}: {counted(len(laid), 'sweep')}, {length_m(laid):.0f} m, beside the time of the way there"
         for name, laid in sweeps
     ]
@@ -424,8 +424,8 @@ def extent_of(local: LocalArea, places: list[En], paths: list[Points]) -> tuple[
     return float(cx - half), float(cy - half), float(cx + half), float(cy + half)
 
 
-def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
-    """Return what came of the plans, one line each."""
+def _words(mission: Mission, plans: Sequence[Plan], *, tws_mps: float, twd_from_rad: float) -> list[str]:
+    """Return what came of the plans in that wind, one line each."""
     out = []
     are_many = len(mission.goals) > 1
     names = [goal.name or (f"goal {n}" if are_many else "goal") for n, goal in enumerate(mission.goals, start=1)]
@@ -445,6 +445,7 @@ def _words(mission: Mission, plans: Sequence[Plan]) -> list[str]:
             0,
             f"{sailing_s + waiting_s:.0f} s to all {min(len(plans), len(mission.goals))} goals"
             + (" and home" if len(plans) > len(mission.goals) else "")
+            + f" in {tws_mps:g} m/s of wind from {direction(twd_from_rad)}°"
             + (f": {sailing_s:.0f} s of sailing, {waiting_s:.0f} s of waiting" if waiting_s else "")
             + (f", {listed(open_ended)} itself not counted" if open_ended else ""),
         )

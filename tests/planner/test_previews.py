@@ -48,8 +48,11 @@ def test_a_preview_tells_what_is_waited_and_stayed(tmp_path):
     (tmp_path / "m.toml").write_text('name = "m"\n' + start + "".join(f"[[goal]]\n{goal}" for goal in goals))
     mission = load_mission(tmp_path / "m.toml")
     plans = [SimpleNamespace(cost_s=39.0, has_path=True, legs=()) for _ in goals]
-    lines = "\n".join(_words(mission, plans))
-    assert lines.startswith("256 s to all 5 goals: 195 s of sailing, 61 s of waiting, Open itself not counted\n")
+    lines = "\n".join(_words(mission, plans, tws_mps=6.0, twd_from_rad=math.radians(340.0)))
+    wind = "in 6 m/s of wind from 340°"
+    assert lines.startswith(
+        f"256 s to all 5 goals {wind}: 195 s of sailing, 61 s of waiting, Open itself not counted\n"
+    )
     assert "Gun: 39 s in 0 courses, then waits 21 s for the gun\n" in lines
     assert "Hour: 39 s in 0 courses, the gun is at 2026-11-21 13:00:00 UTC\n" in lines
     assert "Box: 39 s in 0 courses, then stays 40 s\n" in lines
