@@ -150,7 +150,7 @@ def _check(args: argparse.Namespace) -> int:
         print(f"{args.file}: {document.format}: {summary(document)}: {verdict}")
         return int(is_bad)
     from companion.compose import field_words
-    from companion.mission_check import check_mission, current_words_of, tide_words_of, wind_limit_words
+    from companion.mission_check import check_mission, current_words_of, margin_words, tide_words_of, wind_limit_words
 
     with patience("checking", "an area of many positions takes long"):
         judged = check_mission(Path(args.file), from_deg=args.wind[1] if args.wind else None, unix_s=time.time())
@@ -158,6 +158,8 @@ def _check(args: argparse.Namespace) -> int:
         raise judged.refusals[0]
     mission = judged.mission
     bad = print_findings(judged.findings, args.file)
+    for line in margin_words(mission):
+        print(f"{args.file}: note: {line}")
     for line in field_words(mission):
         print(f"{args.file}: {line}")
     if args.plot:

@@ -106,8 +106,8 @@ def _add_mission(parser: argparse.ArgumentParser) -> None:
         "--state",
         type=Path,
         metavar="FILE",
-        help="where the state for a restart is kept (default: voyages/<mission>.state.json); its "
-        "folder is one boat's, and locked",
+        help="where the state for a restart is kept (default: <mission>.state.json beside the voyage's folder, "
+        "so in voyages/ without --out); its folder is one boat's, and locked",
     )
 
 

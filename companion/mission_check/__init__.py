@@ -24,6 +24,7 @@ from companion.mission_check.sailable import require_sailable
 from companion.mission_check.words import (
     current_words_of,
     is_of_unknown_length,
+    margin_words,
     passage_words,
     tide_words_of,
     wait_words,
@@ -48,6 +49,7 @@ __all__ = [
     "leg_names",
     "leg_problem",
     "legs",
+    "margin_words",
     "passage_words",
     "planned_legs",
     "require_sailable",

@@ -6,7 +6,7 @@ import datetime as dt
 import math
 from itertools import pairwise
 
-from companion.boat import can_hold
+from companion.boat import AutopilotLimits, can_hold, required_margin
 from companion.compose import RECENTRE_M, boat_of, drying_of, tide_of, voyage_of, water_of
 from companion.current import Prior, hour_words, over_water, span_words
 from companion.geo.angles import direction, heading_of
@@ -17,6 +17,7 @@ from companion.safety import LIGHT_WIND, STRONG_WIND
 from companion.words import counted, listed
 
 _DIRECTIONS = 24
+MARGIN_HAIR_M = 0.5  # as under way, where no less is spoken of
 MOST_NAMED = 3  # pieces of water that dries; of more their number is told
 
 
@@ -114,6 +115,26 @@ def passage_words(mission: Mission) -> str:
         f"plans for {mission.skipper.horizon_m / 1000.0:g} km at a time, the frame moves along every "
         f"{(mission.passage.recentre_m or RECENTRE_M) / 1000.0:g} km"
     )
+
+
+def margin_words(mission: Mission) -> tuple[str, ...]:
+    """Return what is worth knowing of the margin, by ArduRover's default parameters in the wind of previews."""
+    margin_m, floor_m = mission.margin_m, mission.options.area.margin_floor_m
+    lines: list[str] = []
+    if floor_m > margin_m:
+        lines.append(f"[area] margin_floor_m: {floor_m:g} m is more than margin_m and is taken as {margin_m:g} m")
+    is_bare = not (mission.area.solids or mission.area.fence.zones)
+    if is_bare or mission.autopilot.frame == "motor":
+        return tuple(lines)
+    boat = boat_of(mission)
+    speed_mps = boat.polar.max_speed_mps(mission.wind.preview_speed_mps)
+    asked = required_margin(AutopilotLimits(), speed_mps=speed_mps, hull=boat.hull)
+    if asked.total_m > margin_m + MARGIN_HAIR_M:
+        lines.append(
+            f"[area] margin_m: {margin_m:g} m; in {mission.wind.preview_speed_mps:g} m/s of wind the habits of an "
+            f"autopilot of ArduRover's default parameters ask for {asked.describe()}; companion doctor asks yours"
+        )
+    return tuple(lines)
 
 
 def wind_limit_words(mission: Mission) -> str:

@@ -256,7 +256,7 @@ def out_file(text: str) -> Path:
         what = "is not a folder" if folder.exists() else "does not exist"
         raise ArgumentTypeError(f"{text}: {folder} {what}; make the folder first")
     if not os.access(path if path.exists() else folder, os.W_OK):
-        raise ArgumentTypeError(f"{text}: must not be written; name another place or change the permissions")
+        raise ArgumentTypeError(f"{text}: cannot be written; name another place or change the permissions")
     return path
 
 
@@ -277,5 +277,5 @@ def out_folder(text: str) -> Path:
     if not above.is_dir():
         raise ArgumentTypeError(f"{text}: {above.name} is a file; name another folder")
     if not os.access(above, os.W_OK):
-        raise ArgumentTypeError(f"{text}: must not be written; name another place or change the permissions")
+        raise ArgumentTypeError(f"{text}: cannot be written; name another place or change the permissions")
     return path

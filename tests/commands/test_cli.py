@@ -7,12 +7,14 @@ import socket
 import subprocess
 import sys
 import time
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 import pytest
 
 from companion import cli
 from companion.program import control
+from companion.program.arguments import out_file, out_folder
 from sitl import cli as sitl_cli
 from sitl.scenario.traffic import free_port
 
@@ -423,3 +425,35 @@ def test_a_check_that_takes_long_says_why(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("companion.mission_check.check_mission", slow)
     assert cli.main(["mission", "check", "missions/lake.toml"]) == 0
     assert "note: checking; an area of many positions takes long\n" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("area", "notes"),
+    [
+        ("margin_m = 15.0", ()),
+        ("margin_m = 12.0", ("margin_m: 12 m; in 5 m/s of wind the habits",)),
+        ("margin_m = 4.0\nmargin_floor_m = 6.0", ("margin_floor_m: 6 m is more than margin_m and is taken as 4 m",)),
+    ],
+)
+def test_check_notes_a_margin_below_what_the_autopilots_habits_ask_for(tmp_path, capsys, area, notes):
+    """It was said under way alone, and a floor above the margin nowhere."""
+    (tmp_path / "rock.wkt").write_text("POINT (-1.32 50.817)")
+    (tmp_path / "m.toml").write_text(f'[[goal]]\nlat = 50.82\nlon = -1.31\n[area]\nobstacles = ["rock.wkt"]\n{area}\n')
+    assert cli.main(["mission", "check", str(tmp_path / "m.toml")]) == 0
+    out = capsys.readouterr().out
+    assert out.endswith("in order\n")
+    assert all(f"note: [area] {note}" in out for note in notes)
+    assert notes or "note: [area]" not in out
+
+
+def test_a_place_that_is_read_only_cannot_be_written(tmp_path, monkeypatch):
+    monkeypatch.setattr("companion.program.arguments.os.access", lambda *_: False)
+    for taken in (out_file, out_folder):
+        with pytest.raises(ArgumentTypeError, match="cannot be written; name another place"):
+            taken(str(tmp_path / "x"))
+
+
+def test_help_of_run_says_where_the_state_is(capsys):
+    with pytest.raises(SystemExit):
+        cli.main(["run", "--help"])
+    assert "<mission>.state.json beside the voyage's folder" in " ".join(capsys.readouterr().out.split())
