@@ -22,6 +22,7 @@ from companion.errors import InputError, JobError
 from companion.guard import Auxiliary, Guard
 from companion.mavlink.tlog import read_tlog
 from companion.telemetry.folder import recorder as module
+from companion.telemetry.folder.reading import read_rows, require_files
 from companion.telemetry.folder.recorder import (
     DECISIONS,
     TLOG,
@@ -59,7 +60,7 @@ def test_a_closed_part_that_is_damaged_is_one_line(tmp_path):
     for data in packed_and_damaged(lines):
         part = tmp_path / "decisions-000001.jsonl.gz"
         part.write_bytes(data)
-        with pytest.raises(JobError, match=re.escape(f"{part}: is damaged")):
+        with pytest.raises(InputError, match=re.escape(f"{part}: is damaged")):
             read_jsonl(tmp_path / DECISIONS)
         log = tmp_path / "telemetry-000001.tlog.gz"
         log.write_bytes(data)
@@ -70,7 +71,7 @@ def test_a_closed_part_that_is_damaged_is_one_line(tmp_path):
 def test_damage_in_the_middle_is_not_a_torn_line(tmp_path):
     path = tmp_path / DECISIONS
     path.write_bytes(b'{"k":1}\n{"k":\n{"k":3}\n')
-    with pytest.raises(JobError, match="line 2"):
+    with pytest.raises(InputError, match="line 2"):
         read_jsonl(path)
 
 
@@ -382,3 +383,17 @@ def test_what_is_written_while_a_part_is_closed_is_not_counted_to_the_next(tmp_p
         assert [p.name for p in closed(tmp_path / "v" / TLOG)] == ["telemetry-000001.tlog"]
         recorder.tend(STAMPS)
         assert len(closed(tmp_path / "v" / TLOG)) == 1, "an empty file is no part"
+
+
+def test_a_row_of_too_few_columns_says_how_many(tmp_path):
+    """It said what zip() says."""
+    path = tmp_path / "track.csv"
+    path.write_text(",".join(TRACK_COLUMNS) + "\n1.0,2.0\n")
+    with pytest.raises(InputError, match=f"line 2: .*2 columns in place of {len(TRACK_COLUMNS)}"):
+        read_rows(path)
+
+
+def test_a_folder_in_place_of_a_file_is_said(tmp_path):
+    (tmp_path / "track.csv").mkdir()
+    with pytest.raises(InputError, match=r"track\.csv: is a folder and no file"):
+        require_files(tmp_path, "track.csv")

@@ -231,7 +231,8 @@ def require_files(folder: Path, *names: str) -> None:
         if not (folder / name).is_file():
             if not folder.is_dir():
                 raise InputError(str(folder), "", "is no folder", "name one that `companion run` left")
-            raise InputError(str(folder), name, "is missing", "name a folder that `companion run` left")
+            what = "is a folder and no file" if (folder / name).is_dir() else "is missing"
+            raise InputError(str(folder), name, what, "name a folder that `companion run` left")
 
 
 @contextlib.contextmanager
@@ -254,7 +255,7 @@ def read_description(folder: Path) -> dict[str, Any]:
 
 
 def read_decisions(folder: Path) -> list[dict[str, Any]]:
-    """Return the records of decisions.jsonl; each is a table with a time and a kind. Raises InputError, JobError."""
+    """Return the records of decisions.jsonl; each is a table with a time and a kind. Raises InputError."""
     path = folder / DECISIONS
     records = read_jsonl(path)
     for number, record in enumerate(records, start=1):
@@ -290,6 +291,8 @@ def _rows_of(path: Path) -> list[dict[str, Any]]:
         if not cells:
             continue
         with believed(path, f"line {number}"):
+            if len(cells) != len(header):
+                raise ValueError(f"{len(cells)} columns in place of {len(header)}")
             row = dict(zip(header, cells, strict=True))
             rows.append({k: v if k in _WORDS else _number(v) for k, v in row.items()})
     return rows

@@ -37,7 +37,7 @@ import numpy as np
 import tomli_w
 
 from companion.disk import Disk, FolderLock, is_mistake, open_regular, reason, unpacked
-from companion.errors import JobError
+from companion.errors import InputError, JobError
 
 DECISIONS = "decisions.jsonl"
 TRACK = "track.csv"
@@ -555,14 +555,14 @@ def read_jsonl(path: Path) -> list[dict[str, Any]]:
 
     Raises:
         FileNotFoundError: it is not there.
-        JobError: it is damaged; the sentence says where.
+        InputError: it is damaged; the sentence says where.
     """
     records: list[dict[str, Any]] = []
     for part in parts(path) or [path]:
         try:
             lines = read_part(part).split(b"\n")
         except gzip.BadGzipFile as error:
-            raise JobError(f"{part}: is damaged ({error}); take it from its copy") from None
+            raise InputError(str(part), "", f"is damaged ({error})", "take it from its copy") from None
         for number, line in enumerate(lines):
             if not line.strip():
                 continue
@@ -570,5 +570,6 @@ def read_jsonl(path: Path) -> list[dict[str, Any]]:
                 records.append(json.loads(line))
             except (ValueError, RecursionError):
                 if number < len(lines) - 2:
-                    raise JobError(f"{part}: line {number + 1} is not JSON; only the last line may be torn") from None
+                    place, problem = f"line {number + 1}", "is not JSON; only the last line may be torn"
+                    raise InputError(str(part), place, problem, "take it from its copy") from None
     return records
