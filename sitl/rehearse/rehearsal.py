@@ -183,6 +183,7 @@ def _worst(
 ) -> tuple[tuple[dict[str, Any], Path | None], ...]:
     """Sail the worst voyages again, while there is time, and keep their folders; a seed repeats to the last bit."""
     found: list[tuple[dict[str, Any], Path | None]] = []
+    begin, end = ("\r", "   ") if sys.stderr.isatty() else ("", "\n")  # one line is written over and over
     for before in (folder / WORST).glob("*-seed-*"):  # ours, and nothing else that may be there
         shutil.rmtree(before) if before.is_dir() else before.unlink()
     for number, record in enumerate(known.worst(MOST_WORST), start=1):
@@ -190,7 +191,7 @@ def _worst(
             found.append((dict(record), None))
             continue
         place = folder / WORST / f"{number}-seed-{record['seed']}"
-        control(sys.stderr, f"\rthe worst again: {number} of {min(MOST_WORST, len(known.records))}   ")
+        control(sys.stderr, f"{begin}the worst again: {number} of {min(MOST_WORST, len(known.records))}{end}")
         sys.stderr.flush()
         kept: Path | None = place
         try:
@@ -205,7 +206,7 @@ def _worst(
             shutil.rmtree(place, ignore_errors=True)
             kept = None
         found.append((dict(record), kept))
-    if found:
+    if found and sys.stderr.isatty():
         sys.stderr.write("\n")
     return tuple(found)
 

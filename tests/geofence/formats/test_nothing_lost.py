@@ -255,7 +255,7 @@ def test_what_of_a_mission_file_no_format_carries_is_said(capsys, tmp_path, endi
         "note: the mission's own settings (name, description, current, output, area.margin_m) are",
     ):
         assert f"out.{ending}: {lost} not carried by this format\n" in out
-    (tmp_path / "plain.toml").write_text(f"[[goal]]\nlat = {HERE.split(',')[0]}\nlon = -1.31\n")
+    (tmp_path / "plain.toml").write_text(f"[[goal]]\nlat = {HERE.split(',', maxsplit=1)[0]}\nlon = -1.31\n")
     _, out, _ = run(capsys, "mission", "convert", tmp_path / "plain.toml", tmp_path / f"plain-out.{ending}")
     assert "not carried" not in out
 

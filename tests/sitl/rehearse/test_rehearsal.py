@@ -226,6 +226,9 @@ def test_a_user_rehearses_a_mission_goes_on_and_looks_at_the_worst(sailed, monke
     assert code == 0
     # of six minutes it told "1040 s left", which was how long all pairs would have taken
     assert re.search(r"1 sailed, 0 at most to come; at most \d+ s left", err)
+    assert re.search(
+        r"^the worst again: 1 of \d$", err, re.MULTILINE
+    )  # a file that is no terminal gets no carriage return
     assert "1 in the file before" in out
     assert "margin_m 15, 1 pair: " in out
     lines = (folder / "results.jsonl").read_bytes()
